@@ -7,6 +7,8 @@ use crate::commands::{additions, compare, demo, export, info, label, pack, repor
 use crate::console::LogFormat;
 use crate::failure::Outcome;
 use clap::{Parser, Subcommand};
+use s3d_dataset::xyz::XyzOptions;
+use s3d_dataset::{PairsOptions, RefineOptions};
 
 /// From an annotated scan to a registered 2D-3D-Semantic data set.
 #[derive(Debug, Parser)]
@@ -170,14 +172,14 @@ pub(crate) enum Command {
              hits themselves.",
         )
     )]
-    Xyz(additions::XyzArgs),
+    Xyz(additions::AddArgs<XyzOptions>),
     /// Find the images of a data set that see the same surface: overlaps, angles, scales and distances, in
     /// area_N/pairs.npz.
-    Pairs(additions::PairsArgs),
+    Pairs(additions::AddArgs<PairsOptions>),
     /// Move the borders of a data set's image labels to the edges of the pictures, in images of their own:
     /// semantic_refined, and semantic_moved, which tells where.
     #[command(after_help = "Example:\n  s3d refine dataset")]
-    Refine(additions::RefineArgs),
+    Refine(additions::AddArgs<RefineOptions>),
     /// Write the files that point cloud loaders read, from an existing data set.
     #[command(
         after_help = concat!(
@@ -196,6 +198,10 @@ pub(crate) enum Command {
         )
     )]
     Report(report::ReportArgs),
+    /// Draw figures of a data set for print, as PDF and PNG: modalities, areas from above, samples,
+    /// distributions, examples, detections.
+    #[command(after_help = "Example:\n  s3d figures dataset -o figs")]
+    Figures(report::FiguresArgs),
     /// Print the tables of statistics of a data set, counted from its files.
     #[command(after_help = "Example:\n  s3d stats dataset")]
     Stats(stats::StatsArgs),
@@ -268,6 +274,7 @@ impl Command {
             | Self::Refine(_)
             | Self::Profile(_)
             | Self::Report(_)
+            | Self::Figures(_)
             | Self::Label(_)
             | Self::Compare(_)
             | Self::Eval(_)
@@ -295,6 +302,7 @@ impl Command {
             Self::Refine(args) => additions::refine(args),
             Self::Profile(args) => additions::profile(args),
             Self::Report(args) => report::run(args),
+            Self::Figures(args) => report::figures(args),
             Self::Stats(args) => stats::run(&args),
             Self::Verify(args) => verify::run(args),
             Self::Compare(args) => compare::run(args),

@@ -2,14 +2,6 @@
 
 use glam::DVec3;
 pub(crate) use s3d_dataset::options::words::{even_width, finite, parsed, positive};
-use s3d_io::dataset::XyzType;
-
-pub(crate) fn stored_xyz(word: &str) -> Result<XyzType, String> {
-    match word.parse() {
-        Ok(kind @ (XyzType::Half | XyzType::Float)) => Ok(kind),
-        _ => Err("must be half or float".to_owned()),
-    }
-}
 
 pub(crate) fn field_of_view(text: &str) -> Result<f64, String> {
     let v = finite(text)?;

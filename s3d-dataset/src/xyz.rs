@@ -19,13 +19,21 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 /// How world coordinates are made from depth.
+///
+/// With the feature `clap` it is a group of arguments of a command line: comments of fields are help texts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
 pub struct XyzOptions {
-    /// [`XyzType::Half`] or [`XyzType::Float`].
+    /// The stored numbers: half floats or 32-bit floats.
+    #[cfg_attr(feature = "clap", arg(long = "type", default_value = "half", value_name = "half|float",
+        value_parser = crate::options::words::stored_xyz))]
     pub xyz: XyzType,
-    /// Replace existing coordinates, though they may be more exact.
+    /// Replace existing coordinates, although they may be more exact.
+    #[cfg_attr(feature = "clap", arg(long))]
     pub overwrite: bool,
-    /// How much time the compression of images may take.
+    /// Compression of the image files: fast, balanced or small.
+    #[cfg_attr(feature = "clap", arg(long, default_value_t, value_name = "fast|balanced|small",
+        value_parser = crate::options::words::parsed::<Compression>))]
     pub compression: Compression,
 }
 

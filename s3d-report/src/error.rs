@@ -36,6 +36,9 @@ pub enum Error {
         /// Whether the export finished.
         is_finished: bool,
     },
+    /// The data set has nothing that figures show.
+    #[error("{}: there is no image and no mesh to draw figures of", .0.display())]
+    NoFigure(PathBuf),
     /// The place of the poster lies in the report, which is written as a whole.
     #[error("{}: the poster lies in the report's own place: choose another one", .0.display())]
     PosterInReport(PathBuf),

@@ -27,6 +27,7 @@ mod areas;
 mod content;
 mod error;
 mod faults;
+mod figures;
 mod first;
 mod ground;
 mod index;
@@ -44,6 +45,7 @@ mod write;
 
 pub use error::{Error, Result};
 pub use faults::Fault;
+pub use figures::{FiguresOptions, figures};
 pub use options::ReportOptions;
 pub use poster::poster;
 pub use s3d_dataset::Context;

@@ -5,6 +5,7 @@ mod common;
 
 mod against;
 mod contract;
+mod figures;
 mod ground;
 mod meshes;
 mod poster;

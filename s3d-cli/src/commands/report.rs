@@ -1,10 +1,10 @@
-//! `s3d report`: a page that shows a data set.
+//! `s3d report` and `s3d figures`: a page that shows a data set, and figures of it for print.
 
 use super::on_threads;
 use crate::args::Threads;
 use crate::failure::{Failure, Outcome};
 use clap::Args;
-use s3d_report::{Error, ReportOptions};
+use s3d_report::{Error, FiguresOptions, ReportOptions};
 use std::path::PathBuf;
 
 #[derive(Debug, Args)]
@@ -37,6 +37,29 @@ pub(crate) fn run(args: ReportArgs) -> Outcome<()> {
         })
     })?;
     made.map(drop).map_err(failure)
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct FiguresArgs {
+    /// The data set's folder. Nothing in it is altered.
+    #[arg(value_name = "OUT")]
+    pub(crate) dataset: PathBuf,
+    /// The folder of the figures [default: beside OUT: OUT_figures]
+    #[arg(short, long, value_name = "PATH")]
+    pub(crate) output: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) options: FiguresOptions,
+    #[command(flatten)]
+    pub(crate) threads: Threads,
+}
+
+pub(crate) fn figures(args: FiguresArgs) -> Outcome<()> {
+    let FiguresArgs { dataset, output, options, threads } = args;
+    let drawn = on_threads(threads, |context| {
+        let to = output.map_or_else(|| s3d_dataset::store::beside(&dataset, "_figures"), Ok)?;
+        Ok(s3d_report::figures(&dataset, &to, &options, context))
+    })?;
+    drawn.map_err(failure)
 }
 
 /// Says an error of the report in the words of the command line.

@@ -20,7 +20,7 @@ use tempfile::TempDir;
 
 /// The commands, called in a folder with `scan` (the input), `out` (an export) and `shard_1`, `shard_2` (its
 /// shards). A new command that writes needs a line here.
-const COMMANDS: [&str; 48] = [
+const COMMANDS: [&str; 50] = [
     "export scan/scene.toml -o new SMALL",
     "export scan/scene.toml -o out SMALL --seed 7 --overwrite",
     "export scan/scene.toml -o new SMALL --profile pointcept,open3d-ml",
@@ -33,6 +33,8 @@ const COMMANDS: [&str; 48] = [
     "pairs out --samples 64",
     "refine out",
     "profile out --to pointnet,open3d-ml --overwrite",
+    "figures out -o figs",
+    "figures out -o drawn --overwrite",
     "pack out --to webdataset",
     "pack out --to webdataset -o packed --overwrite",
     "pack out --to colmap --copy-images",

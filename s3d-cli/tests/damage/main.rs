@@ -58,12 +58,13 @@ fn copy() -> (TempDir, PathBuf) {
 }
 
 /// Every command that reads an export. Each writes into the folder that holds the export, or into the export.
-const READERS: [&[&str]; 15] = [
+const READERS: [&[&str]; 16] = [
     &["verify", "OUT"],
     &["stats", "OUT"],
     &["xyz", "OUT", "--overwrite", "--type", "float"],
     &["pairs", "OUT", "--samples", "64"],
     &["refine", "OUT"],
+    &["figures", "OUT"],
     &["profile", "OUT", "--to", "pointcept"],
     &["profile", "OUT", "--to", "open3d-ml"],
     &["profile", "OUT", "--to", "mmdet3d"],

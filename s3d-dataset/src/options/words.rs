@@ -4,6 +4,7 @@
 use crate::options::canonical_uuid;
 use clap::builder::{BoolValueParser, MapValueParser, TypedValueParser};
 use s3d_geom::NormalAxes;
+use s3d_io::dataset::XyzType;
 use s3d_render::Normals;
 
 /// Parses anything that has a name.
@@ -47,6 +48,14 @@ pub fn even_width(text: &str) -> Result<u32, String> {
     match text.trim().parse::<u32>() {
         Ok(v) if (8..=32_768).contains(&v) && v % 2 == 0 => Ok(v),
         _ => Err("must be an even number from 8 to 32768".to_owned()),
+    }
+}
+
+/// Parses the stored numbers of world coordinates.
+pub(crate) fn stored_xyz(word: &str) -> Result<XyzType, String> {
+    match word.parse() {
+        Ok(kind @ (XyzType::Half | XyzType::Float)) => Ok(kind),
+        _ => Err("must be half or float".to_owned()),
     }
 }
 

@@ -7,7 +7,7 @@ use crate::error::{Error, Result};
 use crate::faults::{Fault, Faults};
 use crate::index::RoomEntry;
 use crate::storeys::{Levels, Storeys};
-use palette::{palette_of, unlabelled};
+pub(crate) use palette::{palette_of, unlabelled};
 use rayon::prelude::*;
 use s3d_dataset::store::{NewFile, check_apart};
 use s3d_dataset::{Context, DataSet};
@@ -72,9 +72,10 @@ pub(crate) fn draw(data: &DataSet, to: &Path, ctx: &Context) -> Result<()> {
 
     let mut faults = Faults::default();
     let classes = class_colors(data, area, &mut faults)?;
-    let rooms = rooms(data, &mut faults)?;
-    let rooms: Vec<&RoomEntry> = rooms.iter().filter(|room| room.area == area).collect();
-    let picture = picture(&mesh, classes.as_deref(), section(&mesh, &rooms));
+    let rooms = rooms_of(data, area, &mut faults)?;
+    let high = section(&mesh, &rooms.iter().collect::<Vec<_>>());
+    let colors = classes.as_deref().map_or(Colors::Own, Colors::Halves);
+    let picture = picture(&mesh, colors, high, SIZE, GROUND);
     write_rgb8(to, &picture, Content::Photo, Compression::default())?;
 
     for without in data.areas().iter().take_while(|each| **each != area) {
@@ -97,8 +98,15 @@ fn first_mesh(data: &DataSet) -> Result<Option<(u32, TriMesh)>> {
     Ok(None)
 }
 
+/// Returns the rooms of an area.
+pub(crate) fn rooms_of(data: &DataSet, area: u32, faults: &mut Faults) -> Result<Vec<RoomEntry>> {
+    let mut rooms = rooms(data, faults)?;
+    rooms.retain(|room| room.area == area);
+    Ok(rooms)
+}
+
 /// Returns the colour of each face's class. `None` without labels.
-fn class_colors(data: &DataSet, area: u32, faults: &mut Faults) -> Result<Option<Vec<[u8; 3]>>> {
+pub(crate) fn class_colors(data: &DataSet, area: u32, faults: &mut Faults) -> Result<Option<Vec<[u8; 3]>>> {
     let root = data.layout().root();
     let table = faults.keep(root, data.labels())?.flatten();
     let votes = faults.keep(root, data.face_votes(area))?.flatten();
@@ -121,14 +129,15 @@ fn class_colors(data: &DataSet, area: u32, faults: &mut Faults) -> Result<Option
 
 /// Returns the height below which a mesh is shown: just below the ceilings of the storey with the most rooms,
 /// or infinity if it has none.
-fn section(mesh: &TriMesh, rooms: &[&RoomEntry]) -> f64 {
+pub(crate) fn section(mesh: &TriMesh, rooms: &[&RoomEntry]) -> f64 {
     let storeys = Storeys::new(rooms, &[]);
     let [_, high] = storeys.slab(storeys.fullest(), &Levels::of(mesh));
     high
 }
 
-/// Returns a camera obliquely above a mesh that sees all of it below the height `section`.
-fn camera_of(mesh: &TriMesh, section: f64) -> Camera {
+/// Returns a camera obliquely above a mesh that sees all of it below the height `section`. It has
+/// [`SAMPLES`] rays along each side of a pixel.
+pub(crate) fn camera_of(mesh: &TriMesh, section: f64, size: [u32; 2]) -> Camera {
     let low = mesh.aabb().min.as_dvec3();
     let high = mesh
         .aabb()
@@ -137,7 +146,7 @@ fn camera_of(mesh: &TriMesh, section: f64) -> Camera {
         .with_z(section.min(f64::from(mesh.aabb().max.z)));
     let middle = 0.5 * (low + high);
     let back = BACK.normalize();
-    let [width, height] = SIZE.map(|side| side * SAMPLES);
+    let [width, height] = size.map(|side| side * SAMPLES);
 
     // The least distance from which each corner is in the picture.
     let right = DVec3::Z.cross(back).normalize();
@@ -160,21 +169,42 @@ fn camera_of(mesh: &TriMesh, section: f64) -> Camera {
     Camera::perspective(pose, FOV_DEG.to_radians(), width, height)
 }
 
-/// Draws a mesh below the height `section`: its colours, and on the right half the colours `classes` of its
-/// faces, if there are some.
-fn picture(mesh: &TriMesh, classes: Option<&[[u8; 3]]>, section: f64) -> Raster<[u8; 3]> {
-    let camera = camera_of(mesh, section);
+/// The colours that a mesh is drawn in. Those of classes are a colour for each face.
+#[derive(Clone, Copy)]
+pub(crate) enum Colors<'a> {
+    /// Its own.
+    Own,
+    Classes(&'a [[u8; 3]]),
+    /// Its own on the left, and those of classes on the right of a line.
+    Halves(&'a [[u8; 3]]),
+}
+
+/// Draws a mesh below the height `section`, obliquely from above, before a ground of this colour.
+pub(crate) fn picture(
+    mesh: &TriMesh,
+    colors: Colors<'_>,
+    section: f64,
+    size: [u32; 2],
+    ground: [f32; 3],
+) -> Raster<[u8; 3]> {
+    let camera = camera_of(mesh, section, size);
     let scene = Scene::new(mesh);
     let textures = MipMaps::new(mesh);
     let filter = TextureFilter::default();
     let rays = camera.rays();
-    let middle = SIZE[0] / 2;
+    let [width, height] = size;
+    // Where the colours of classes begin.
+    let (classes, from) = match colors {
+        Colors::Own => (None, width),
+        Colors::Classes(classes) => (Some(classes), 0),
+        Colors::Halves(classes) => (Some(classes), width / 2),
+    };
 
     let color = |x: u32, y: u32| -> [f32; 3] {
         let direction = rays.at(x, y);
-        let Some(face) = first_front(&scene, camera.pose.location, direction, section) else { return GROUND };
+        let Some(face) = first_front(&scene, camera.pose.location, direction, section) else { return ground };
         let seen = rgb_of_ray(&scene, &textures, &camera, direction, face, &filter).map(f32::from);
-        let Some(classes) = classes.filter(|_| x / SAMPLES >= middle) else { return seen };
+        let Some(classes) = classes.filter(|_| x / SAMPLES >= from) else { return seen };
 
         let class = classes.get(face as usize).copied().unwrap_or_else(unlabelled);
         let facing = mesh.normal(face).as_dvec3().dot(direction.normalize()).abs() as f32;
@@ -186,7 +216,7 @@ fn picture(mesh: &TriMesh, classes: Option<&[[u8; 3]]>, section: f64) -> Raster<
         class.map(|channel| (1.0 - DETAIL) * f32::from(channel) * (0.6 + 0.4 * facing) + DETAIL * gray)
     };
     let pixel = |x: u32, y: u32| -> [u8; 3] {
-        if classes.is_some() && x.abs_diff(middle) <= LINE_PX / 2 {
+        if matches!(colors, Colors::Halves(_)) && x.abs_diff(from) <= LINE_PX / 2 {
             return LINE.map(|channel| channel as u8);
         }
         let mut sum = [0.0; 3];
@@ -197,7 +227,6 @@ fn picture(mesh: &TriMesh, classes: Option<&[[u8; 3]]>, section: f64) -> Raster<
         sum.map(|channel| (channel / (SAMPLES * SAMPLES) as f32).round() as u8)
     };
 
-    let [width, height] = SIZE;
     let rows: Vec<Vec<[u8; 3]>> = (0..height)
         .into_par_iter()
         .map(|y| (0..width).map(|x| pixel(x, y)).collect())
@@ -243,7 +272,7 @@ mod tests {
     #[test]
     fn all_corners_are_in_the_picture() {
         let house = slabs(&[(0.0, true), (2.5, false)]);
-        let camera = camera_of(&house, 2.4);
+        let camera = camera_of(&house, 2.4, SIZE);
         for corner in house.positions() {
             let (pixel, _) = camera.project(corner.with_z(corner.z.min(2.4)).as_dvec3()).unwrap();
             let is_inside = pixel.cmpge(DVec2::ZERO).all()
@@ -261,7 +290,7 @@ mod tests {
         // The table at 1 m has no front here.
         assert!(matches!(first_front(&scene, eye, DVec3::NEG_Z, 2.4), Some(0 | 1)));
         assert_eq!(first_front(&scene, eye, DVec3::Z, 2.4), None);
-        let picture = picture(&house, Some(&[[200, 0, 0]; 6]), 2.4);
+        let picture = picture(&house, Colors::Halves(&[[200, 0, 0]; 6]), 2.4, SIZE, GROUND);
         let right = picture.at(SIZE[0] * 5 / 8, SIZE[1] / 2);
         assert!(right[0] > right[1] + 80 && right[1] == right[2], "{right:?}");
         assert_eq!(picture.at(SIZE[0] / 2, 10), [255; 3]);

@@ -70,12 +70,12 @@ struct Candidate {
 }
 
 /// Returns the colour of surface without a label.
-pub(super) fn unlabelled() -> Rgb {
+pub(crate) fn unlabelled() -> Rgb {
     RULES.unlabelled
 }
 
 /// Returns the colours of classes with these names, a colour for each.
-pub(super) fn palette_of(names: &[impl AsRef<str>]) -> Vec<Rgb> {
+pub(crate) fn palette_of(names: &[impl AsRef<str>]) -> Vec<Rgb> {
     // The candidates for each part of a building, and for things.
     let Rules { calm, strong, .. } = &*RULES;
     let of_parts = RULES.building.iter();
