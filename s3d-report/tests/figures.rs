@@ -91,7 +91,8 @@ fn detections_are_drawn_beside_the_true_boxes() {
         .filter(|i| i.class == "chair")
         .map(|i| {
             let [a, b, c, d, e, f] = i.bbox;
-            json!({"area": 1, "room": i.room, "class": "chair", "score": 0.5, "min": [a, b, c], "max": [d, e, f]})
+            let (low, high) = ([a, b, c], [d, e, f]);
+            json!({"area": 1, "room": i.room, "class": "chair", "score": 0.5, "min": low, "max": high})
         })
         .collect();
     assert!(found.len() == of("chair") && found.len() > 4);

@@ -34,18 +34,13 @@ impl<'a> Above<'a> {
         let whole = Self { mesh, high, part: [[0, 0], [width, height]] };
         let own = whole.picture(Colors::Own);
 
-        let (mut low, mut most) = ([width, height], [0, 0]);
+        let ([mut x0, mut x1], [mut y0, mut y1]) = ([width, 0], [height, 0]);
         for (y, row) in (0..).zip(own.pixels.rows()) {
             for (x, _) in (0..).zip(row).filter(|(_, pixel)| **pixel != WHITE) {
-                for (k, at) in [x, y].into_iter().enumerate() {
-                    if let (Some(low), Some(most)) = (low.get_mut(k), most.get_mut(k)) {
-                        *low = at.min(*low);
-                        *most = at.max(*most);
-                    }
-                }
+                (x0, x1) = (x0.min(x), x1.max(x));
+                (y0, y1) = (y0.min(y), y1.max(y));
             }
         }
-        let [[x0, x1], [y0, y1]] = [[low[0], most[0]], [low[1], most[1]]];
         let [x0, y0] = [x0, y0].map(|k| k.saturating_sub(MARGIN));
         let part = if x1 > x0 && y1 > y0 {
             [[x0, y0], [width.min(x1 + MARGIN) - x0, height.min(y1 + MARGIN) - y0]]

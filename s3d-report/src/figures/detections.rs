@@ -87,8 +87,8 @@ pub(super) fn detections(book: &Book<'_>, area: u32, found: &[Detection]) -> Res
     }
     legend.draw(&mut sheet, height + 1.6 * SIZE);
     let caption = format!(
-        "True boxes of area {area}, without ceilings, floors and walls, and the detections of the highest scores: \
-         of each class as many as there are."
+        "True boxes of area {area}, without ceilings, floors and walls, and the detections of the highest \
+         scores: of each class as many as there are."
     );
     Ok(Some(Drawn { name: format!("detections_{area}"), caption, sheet }))
 }

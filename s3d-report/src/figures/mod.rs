@@ -152,7 +152,8 @@ struct About {
 ///
 /// # Errors
 /// [`Error::NoFigure`] if there is nothing to draw. [`Error::Dataset`] if there is no finished data set in
-/// `out`, a file of it or the list of detections is damaged, or `to` cannot be written, or is there and not to be replaced.
+/// `out`, a file of it or the list of detections is damaged, or `to` cannot be written, or is there and not
+/// to be replaced.
 pub fn figures(out: &Path, to: &Path, options: &FiguresOptions, ctx: &Context) -> Result<()> {
     let FiguresOptions { detections, overwrite } = options;
     let data = DataSet::open(out)?;

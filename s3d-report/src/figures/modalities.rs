@@ -28,8 +28,8 @@ pub(super) fn modalities(book: &Book<'_>) -> Result<Option<Drawn>> {
     }
     let kind = if is_wide { "panorama" } else { "view" };
     let caption = format!(
-        "A {kind} of {} (area {}) in each modality. Depth is white where it is near; coordinates are red along \
-         x, green along y, blue along z.",
+        "A {kind} of {} (area {}) in each modality. Depth is white where it is near; coordinates are red \
+         along x, green along y, blue along z.",
         words_of(&image.room),
         image.area
     );
