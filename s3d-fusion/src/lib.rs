@@ -81,6 +81,7 @@
     deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable, clippy::string_slice)
 )]
 
+mod align;
 mod close;
 mod columns;
 mod decimate;
@@ -94,6 +95,7 @@ mod origin;
 mod range_image;
 mod register;
 
+pub use align::{AlignError, AlignOptions, Alignment, SurfacePoints, align};
 pub use close::{CloseError, CloseOptions, ClosedHoles, OpenLoops, close_holes};
 pub use columns::{ColumnsError, MeshColumns};
 pub use decimate::{DecimateError, DecimateOptions, Decimated, decimate, decimate_while};
