@@ -138,9 +138,15 @@ fn main() {
                 let mut noise = Dice(seed);
                 let a = part(soup, |p| p.dot(d) < ta, &pose, 0.005, &mut noise);
                 let b = part(other, |p| p.dot(d) > tb, &DAffine3::IDENTITY, 0.005, &mut noise);
+                let center = pose.inverse().transform_point3(a.aabb().center().as_dvec3());
                 let start = Instant::now();
                 let [a, b] = [&a, &b].map(|m| SurfacePoints::of_mesh(m).unwrap());
                 let sampled = start.elapsed().as_secs_f64();
+                if std::env::var("ALIGN_DEBUG").is_ok() {
+                    let t = pose.inverse();
+                    *s3d_fusion::TRUTH.lock().unwrap() = Some(t).filter(|_| !wrong);
+                    eprintln!("truth yaw {:?} area {:.1} {:.1}", DQuat::from_mat3(&t.matrix3).to_scaled_axis(), a.area_m2(), b.area_m2());
+                }
                 let found = align(&a, &b, &AlignOptions::default());
                 let all = start.elapsed().as_secs_f64();
                 let label = format!("{name}{k}{}", if wrong { "w" } else { "" });
@@ -152,7 +158,7 @@ fn main() {
                         let off = best.b_from_a * truth.inverse();
                         let middle = truth.transform_point3(pose.transform_point3(DVec3::ZERO));
                         let _ = middle;
-                        let c: DVec3 = DVec3::ZERO;
+                        let c: DVec3 = center;
                         let mm = off.transform_point3(c).distance(c) * 1e3;
                         let deg = DQuat::from_mat3(&off.matrix3).to_scaled_axis().length().to_degrees();
                         let good = if mm < 5.0 && deg < 0.05 { "GOOD" } else if mm < 50.0 && deg < 1.0 { "NEAR" } else { "BAD" };

@@ -10,6 +10,8 @@ mod surface;
 mod turns;
 
 pub use surface::SurfacePoints;
+#[doc(hidden)]
+pub use search::TRUTH;
 
 use crate::register::OpenMotion;
 use s3d_geom::glam::DAffine3;

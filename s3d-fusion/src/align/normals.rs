@@ -16,7 +16,7 @@ pub(super) struct Neighbours<'a> {
 /// The fewest points that make a plane.
 const LEAST_POINTS: usize = 6;
 /// How often the points off the plane lose weight.
-const ROUNDS: usize = 3;
+const ROUNDS: usize = 2;
 /// The least width of the weights, metres.
 const LEAST_WIDTH_M: f64 = 0.003;
 /// Points are on a surface if they spread less than this across it, as a share of the second largest spread.
@@ -55,8 +55,9 @@ impl<'a> Neighbours<'a> {
 
             let distances: Vec<f64> = near.iter().map(|q| normal.dot(*q - middle)).collect();
             let mut sizes: Vec<f64> = distances.iter().map(|d| d.abs()).collect();
-            sizes.sort_unstable_by(f64::total_cmp);
-            let width = (3.0 * sizes[sizes.len() / 2]).max(LEAST_WIDTH_M);
+            let half = sizes.len() / 2;
+            let (_, median, _) = sizes.select_nth_unstable_by(half, f64::total_cmp);
+            let width = (3.0 * *median).max(LEAST_WIDTH_M);
             for (weight, distance) in weights.iter_mut().zip(&distances) {
                 let spread = 1.0 + (distance / width) * (distance / width);
                 *weight = 1.0 / (spread * spread);
@@ -121,6 +122,10 @@ fn plane(points: &[DVec3], weights: &[f64]) -> Option<(DVec3, DVec3, [f64; 3])> 
 fn least_axis(mut m: [[f64; 3]; 3]) -> ([f64; 3], DVec3) {
     let mut axes = [DVec3::X, DVec3::Y, DVec3::Z];
     for _ in 0..12 {
+        let off = m[0][1].abs() + m[0][2].abs() + m[1][2].abs();
+        if off <= 1e-12 * (m[0][0] + m[1][1] + m[2][2]) {
+            break;
+        }
         for (p, q) in [(0, 1), (0, 2), (1, 2)] {
             if m[p][q].abs() < 1e-300 {
                 continue;

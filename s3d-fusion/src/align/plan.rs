@@ -23,6 +23,9 @@ const SLAB_M: f64 = 0.6;
 const MOST_SLABS: f64 = 24.0;
 /// What a floor counts, where a wall counts 1. Most floors agree with most others.
 pub(super) const FLOOR_WEIGHT: f32 = 0.3;
+/// What stands where the other surface has room counts as so much that agrees. Pixels are coarse, so that
+/// surfaces of one building contradict each other a little.
+const AGAINST: f32 = 2.0;
 /// A pixel is full if it has this share of the points of a wall that crosses it.
 const FULL: f64 = 0.3;
 /// The share of the points beside which no image is made: single points far away.
@@ -98,7 +101,9 @@ impl<'a> Plan<'a> {
         slabs.iter_mut().flatten().for_each(|slab| {
             plan.saturate(&mut slab.walls, plan.pixel_m * plan.slab_m);
             plan.saturate(&mut slab.floors, plan.pixel_m * plan.pixel_m);
-            [&mut slab.walls, &mut slab.floors, &mut slab.room].map(|image| plan.transform(image));
+            for image in [&mut slab.walls, &mut slab.floors, &mut slab.room] {
+                plan.transform(image);
+            }
         });
         plan.slabs = slabs;
         plan
@@ -116,11 +121,13 @@ impl<'a> Plan<'a> {
         let mut sum = vec![Complex32::ZERO; width * height];
         for (of_a, of_b) in slabs.into_iter().zip(&self.slabs) {
             let (Some(mut of_a), Some(of_b)) = (of_a, of_b) else { continue };
-            [&mut of_a.walls, &mut of_a.floors, &mut of_a.room].map(|image| self.transform(image));
+            for image in [&mut of_a.walls, &mut of_a.floors, &mut of_a.room] {
+                self.transform(image);
+            }
             for (i, sum) in sum.iter_mut().enumerate() {
                 let agree = of_a.walls[i].conj() * of_b.walls[i]
                     + of_a.floors[i].conj() * of_b.floors[i] * FLOOR_WEIGHT;
-                *sum += agree * 2.0 - of_a.room[i].conj() * of_b.room[i];
+                *sum += agree * 2.0 - of_a.room[i].conj() * of_b.room[i] * AGAINST;
             }
         }
         self.transform_back(&mut sum);

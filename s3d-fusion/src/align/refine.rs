@@ -69,10 +69,10 @@ pub(super) struct Settled {
 
 /// The largest angle between normals of one surface.
 const MOST_ANGLE_RAD: f64 = 0.5;
-/// The least width of the weights, metres.
-const LEAST_WIDTH_M: f64 = 0.001;
+/// The least width of the weights, as a share of the reach.
+const WIDTH: f64 = 0.4;
 /// A motion of which less is along normals is left alone.
-const LEAST_SHARE: f64 = 0.01;
+const LEAST_SHARE: f64 = 0.003;
 /// A step below this, metres and radians, is the last.
 const LAST_STEP: f64 = 1e-6;
 /// Fewer matches decide nothing.
@@ -139,7 +139,7 @@ impl<'a> Pair<'a> {
         for _ in 0..steps {
             let found: [Vec<Match>; 2] = [0, 1]
                 .map(|side| self.partners(&place, side, reach, every[side]).flatten().collect());
-            let (moved, next_open, largest, width) = step(&found, &place, unknown)?;
+            let (moved, next_open, largest, width) = step(&found, &place, unknown, WIDTH * reach)?;
             (place, open) = (moved, next_open);
             let least = reach_m[1].max(3.0 * width).min(reach_m[0]);
             if largest < LAST_STEP && reach <= least {
@@ -161,6 +161,7 @@ fn step(
     found: &[Vec<Match>; 2],
     place: &Similarity,
     unknown: &'static [usize],
+    least_width: f64,
 ) -> Option<(Similarity, Vec<Open>, f64, f64)> {
     let count: usize = found.iter().map(Vec::len).sum();
     if count < LEAST_MATCHES {
@@ -170,8 +171,9 @@ fn step(
     let middle = all().map(|m| m.from).sum::<DVec3>() / count as f64;
     let mut sizes: Vec<f64> = all().map(|m| m.distance.abs()).collect();
     let (_, median, _) = sizes.select_nth_unstable_by(count / 2, f64::total_cmp);
-    // Twice the standard deviation, if distances were normal.
-    let width = (2.0 * 1.4826 * *median).max(LEAST_WIDTH_M);
+    // Twice the standard deviation, if distances were normal. Where floors fit, most distances are small, and
+    // walls still count.
+    let width = (2.0 * 1.4826 * *median).max(least_width);
 
     let mut system = System::new(1, unknown);
     for (side, matches) in found.iter().enumerate() {

@@ -17,6 +17,9 @@ pub(super) struct Score {
     pub(super) contradiction: f64,
 }
 
+/// A point where the other surface has room counts as so many that fit. Surfaces of one building hardly
+/// contradict each other.
+const AGAINST: f64 = 4.0;
 /// The least cosine of a floor's normal with the upright axis.
 const LEVEL: f32 = 0.8;
 
@@ -53,7 +56,7 @@ pub(super) fn score(
             }
         }
     }
-    score.evidence_m2 = fits - contradicts;
+    score.evidence_m2 = fits - AGAINST * contradicts;
     score.contradiction = contradicts / (fits + contradicts).max(f64::MIN_POSITIVE);
     score
 }

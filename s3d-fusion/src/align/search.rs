@@ -26,13 +26,18 @@ struct Level {
 }
 
 const LEVELS: [Level; 3] = [
-    Level { cell_m: 0.2, reach_m: [0.4, 0.12], near_m: 0.1, steps: 10, most_points: 1_500, places: 60 },
+    Level { cell_m: 0.2, reach_m: [0.4, 0.12], near_m: 0.1, steps: 10, most_points: 1_500, places: 100 },
     Level { cell_m: 0.1, reach_m: [0.15, 0.04], near_m: 0.04, steps: 8, most_points: 4_000, places: 16 },
-    Level { cell_m: 0.05, reach_m: [0.06, 0.02], near_m: 0.02, steps: 25, most_points: 40_000, places: 5 },
+    Level { cell_m: 0.06, reach_m: [0.06, 0.02], near_m: 0.02, steps: 25, most_points: 40_000, places: 5 },
 ];
 
 /// Places that differ by less are one: shares of the first reach of a level, and radians.
 const SAME_RAD: f64 = 0.03;
+/// Places of plan images that are nearer are one, metres.
+const APART_M: f64 = 0.4;
+const APART_Z_M: f64 = 0.15;
+#[doc(hidden)]
+pub static TRUTH: std::sync::Mutex<Option<DAffine3>> = std::sync::Mutex::new(None);
 
 /// A way to look at both surfaces: as they are, or tilted so that other planes are level.
 struct View {
@@ -62,14 +67,37 @@ pub(super) fn search(
         free: FreeSpace::new(&a.points, a.has_sides),
     }];
     let free_b = FreeSpace::new(&b.points, b.has_sides);
+    let t0 = std::time::Instant::now();
     let mut found = everywhere(&views, b, &free_b);
 
+    if let Some(t) = *TRUTH.lock().unwrap() {
+        let turn = DQuat::from_mat3(&t.matrix3);
+        let place = Similarity { turn, scale: 1.0, shift: t.transform_point3(a.middle) - b.middle };
+        let at = found.iter().position(|f| f.place.turn.angle_between(turn) < 0.02 && f.place.shift.distance(place.shift) < 0.5);
+        let ts = turns(a, b); let zs = shifts(a, b);
+        eprintln!("  turns {} {:?} shifts {} {:?}", ts.len(), ts.iter().map(|t| DQuat::from_rotation_z(*t).angle_between(turn).to_degrees()).enumerate().min_by(|a, b| a.1.total_cmp(&b.1)), zs.len(), zs.iter().map(|z| (z - place.shift.z).abs()).enumerate().min_by(|a, b| a.1.total_cmp(&b.1)));
+        if let Some(i) = at {
+            let mut f = vec![found[i].clone()];
+            eprintln!("  start {:.0}", 1e3 * (f[0].place.shift - place.shift));
+            for (number, level) in LEVELS.iter().enumerate() {
+                f = refined(&f, &views, b, &free_b, level, options, number == 2);
+                if let Some(f) = f.first() { eprintln!("    {:.0} {:.2}° {:.2?}", 1e3 * (f.place.shift - place.shift), f.place.turn.angle_between(turn).to_degrees(), f.score); } else { break }
+            }
+        }
+        let mut f = vec![Found { view: 0, place, score: Score::default() }];
+        for (number, level) in LEVELS.iter().enumerate() {
+            f = refined(&f, &views, b, &free_b, level, options, number == 2);
+            if let Some(f) = f.first() {
+            eprintln!("  truth rank {at:?} of {} level {number}: {:.1}mm {:.2?}", found.len(), 1e3 * f.place.shift.distance(place.shift), f.score); }
+        }
+    }
     for (number, level) in LEVELS.iter().enumerate() {
         found.truncate(level.places);
+        if std::env::var("ALIGN_DEBUG").is_ok() { eprintln!("{:?}", t0.elapsed()); }
         let is_last = number + 1 == LEVELS.len();
         found = refined(&found, &views, b, &free_b, level, options, is_last);
     }
-    if std::env::var("ALIGN_DEBUG").is_ok() { for f in &found { eprintln!("{f:?}"); } }
+    if std::env::var("ALIGN_DEBUG").is_ok() { eprintln!("{:?}", t0.elapsed());  }
     let last = &LEVELS[LEVELS.len() - 1];
     let settled: Vec<Alignment> =
         found.iter().filter_map(|f| told(f, &views, a, b, last, options)).collect();
@@ -97,8 +125,23 @@ fn everywhere(views: &[View], b: &SurfacePoints, free_b: &FreeSpace) -> Vec<Foun
         }));
     }
     all.sort_by(|a, b| b.0.total_cmp(&a.0));
-    if std::env::var("ALIGN_DEBUG").is_ok() { for f in all.iter().take(12) { eprintln!("{:.1} {:?}", f.0, f.1.place); } }
-    all.into_iter().map(|(_, found)| found).collect()
+    // Neighbours would all become the best of them.
+    let mut apart: Vec<Found> = Vec::new();
+    for (_, f) in all {
+        let is_same = |other: &Found| {
+            f.view == other.view
+                && f.place.turn.angle_between(other.place.turn) < SAME_RAD
+                && f.place.shift.truncate().distance(other.place.shift.truncate()) < APART_M
+                && (f.place.shift.z - other.place.shift.z).abs() < APART_Z_M
+        };
+        if !apart.iter().any(is_same) {
+            apart.push(f);
+        }
+        if apart.len() >= LEVELS[0].places {
+            break;
+        }
+    }
+    apart
 }
 
 /// Moves all places at a level, and orders those that differ by what speaks for them.

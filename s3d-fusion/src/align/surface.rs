@@ -8,15 +8,15 @@ use s3d_geom::glam::{DQuat, DVec3, Vec3};
 use s3d_geom::{Density, PointCloud, SurfaceSampler, TriMesh};
 
 /// The edge of the cubes of which each has a point, metres, unless there would be too many.
-const CELL_M: f64 = 0.05;
+const CELL_M: f64 = 0.06;
 /// About so many points are kept at most.
 const MOST_POINTS: f64 = 400_000.0;
 /// The fewest points that are a surface: a quarter of a square metre.
 const LEAST_POINTS: usize = 100;
 /// Normals are found in this many cubes around a point.
-const RADIUS_CELLS: f64 = 2.2;
+const RADIUS_CELLS: f64 = 1.7;
 /// So many points are drawn on a mesh for each cube.
-const DRAWN: f64 = 5.0;
+const DRAWN: f64 = 3.0;
 
 /// The surface of a mesh or a cloud: evenly spread points with normals.
 #[derive(Clone, Debug, PartialEq)]
@@ -65,7 +65,7 @@ impl SurfacePoints {
 
         let cell_m = wide_enough(&near);
         // Dense clouds are thinned first, so that time follows from the surface.
-        let (dense, dense_sides) = thinned(&near, &sides, 0.35 * cell_m);
+        let (dense, dense_sides) = thinned(&near, &sides, 0.5 * cell_m);
         let (places, place_sides) = thinned(&dense, &dense_sides, cell_m);
         let neighbours = Neighbours::new(&dense, &dense_sides, RADIUS_CELLS * cell_m);
         let found: Vec<Option<(DVec3, DVec3)>> = places

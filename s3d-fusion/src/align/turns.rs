@@ -10,8 +10,12 @@ const BINS: usize = 720;
 /// Normals of walls are at least this level.
 const LEVEL: f32 = 0.3;
 /// A candidate agrees at least as well as this share of the best, counted from what chance does.
-const LEAST_TURN: f64 = 0.4;
-const MOST_TURNS: usize = 12;
+const LEAST_TURN: f64 = 0.2;
+const MOST_TURNS: usize = 8;
+/// So many of the best turns are also tried with quarters of a turn more.
+const QUARTERED: usize = 2;
+/// Turns that differ by less are one, radians.
+const SAME_RAD: f64 = 0.02;
 /// If the best turn is not better than others by this factor, walls tell nothing, and all turns are tried.
 const TOLD: f64 = 1.5;
 /// The number of turns then.
@@ -50,7 +54,19 @@ pub(super) fn turns(a: &SurfacePoints, b: &SurfacePoints) -> Vec<f64> {
         .collect();
     found.sort_by(|a, b| b.0.total_cmp(&a.0));
     found.truncate(MOST_TURNS);
-    found.into_iter().map(|(_, turn)| turn).collect()
+
+    // Most buildings have walls in four directions, even where one part shows them on one side alone.
+    let best: Vec<f64> = found.iter().map(|(_, turn)| *turn).collect();
+    let mut turns = best.clone();
+    for quarter in 1..4 {
+        let more = best.iter().take(QUARTERED).map(|turn| (turn + f64::from(quarter) * TAU / 4.0) % TAU);
+        for turn in more {
+            if turns.iter().all(|other| (turn - other + 0.5 * TAU).rem_euclid(TAU) - 0.5 * TAU > SAME_RAD || (turn - other + 0.5 * TAU).rem_euclid(TAU) - 0.5 * TAU < -SAME_RAD) {
+                turns.push(turn);
+            }
+        }
+    }
+    turns
 }
 
 /// How many normals of walls look into each direction.
