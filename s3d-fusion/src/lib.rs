@@ -95,7 +95,7 @@ mod origin;
 mod range_image;
 mod register;
 
-pub use align::{AlignError, AlignOptions, Alignment, SurfacePoints, TRUTH, align};
+pub use align::{AlignError, AlignOptions, Aligned, Alignment, Doubt, SurfacePoints, align};
 pub use close::{CloseError, CloseOptions, ClosedHoles, OpenLoops, close_holes};
 pub use columns::{ColumnsError, MeshColumns};
 pub use decimate::{DecimateError, DecimateOptions, Decimated, decimate, decimate_while};

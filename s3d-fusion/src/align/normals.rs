@@ -135,12 +135,10 @@ fn least_axis(mut m: [[f64; 3]; 3]) -> ([f64; 3], DVec3) {
             let cosine = 1.0 / (tangent * tangent + 1.0).sqrt();
             let sine = tangent * cosine;
             for k in 0..3 {
-                (m[k][p], m[k][q]) =
-                    (cosine * m[k][p] - sine * m[k][q], sine * m[k][p] + cosine * m[k][q]);
+                (m[k][p], m[k][q]) = (cosine * m[k][p] - sine * m[k][q], sine * m[k][p] + cosine * m[k][q]);
             }
             for k in 0..3 {
-                (m[p][k], m[q][k]) =
-                    (cosine * m[p][k] - sine * m[q][k], sine * m[p][k] + cosine * m[q][k]);
+                (m[p][k], m[q][k]) = (cosine * m[p][k] - sine * m[q][k], sine * m[p][k] + cosine * m[q][k]);
             }
             (axes[p], axes[q]) = (cosine * axes[p] - sine * axes[q], sine * axes[p] + cosine * axes[q]);
         }

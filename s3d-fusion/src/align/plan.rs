@@ -57,6 +57,8 @@ pub(super) struct Plan<'a> {
     /// The surface that moves.
     a: Shape<'a>,
     are_two_sided: bool,
+    /// How far `a` reaches from the axis that it turns about, metres.
+    reach_m: f64,
     pixel_m: f64,
     slab_m: f64,
     /// Pixels along X and Y.
@@ -81,13 +83,13 @@ struct Images {
 impl<'a> Plan<'a> {
     pub(super) fn new(a: Shape<'a>, b: Shape<'a>) -> Self {
         let (low, high) = extent(b.surface);
-        let reach = radius(a.surface);
-        let wide = (high - low).truncate().max_element() + 2.0 * reach;
+        let reach_m = radius(a.surface);
+        let wide = (high - low).truncate().max_element() + 2.0 * reach_m;
         let pixel_m = PIXEL_M.max(wide / MOST_PIXELS);
         let slab_m = SLAB_M.max((high.z - low.z) / MOST_SLABS);
         let low = low - DVec3::new(0.0, 0.0, slab_m);
 
-        let pixels = |edge_m: f64| even_size(((edge_m + 2.0 * reach) / pixel_m) as usize + 4);
+        let pixels = |edge_m: f64| even_size(((edge_m + 2.0 * reach_m) / pixel_m) as usize + 4);
         let size = [pixels(high.x - low.x), pixels(high.y - low.y)];
         let mut planner = FftPlannerScalar::new();
         let forward = size.map(|n| planner.plan_fft_forward(n));
@@ -95,8 +97,19 @@ impl<'a> Plan<'a> {
         let are_two_sided = !(a.surface.has_sides && b.surface.has_sides);
         let count = ((high.z - low.z) / slab_m) as usize + 2;
 
-        let mut plan =
-            Self { a, b, are_two_sided, pixel_m, slab_m, size, low, slabs: Vec::new(), forward, inverse };
+        let mut plan = Self {
+            a,
+            b,
+            are_two_sided,
+            reach_m,
+            pixel_m,
+            slab_m,
+            size,
+            low,
+            slabs: Vec::new(),
+            forward,
+            inverse,
+        };
         let mut slabs = plan.images(plan.b.surface, plan.b.free, 0.0, DVec3::ZERO, low, count, false);
         slabs.iter_mut().flatten().for_each(|slab| {
             plan.saturate(&mut slab.walls, plan.pixel_m * plan.slab_m);
@@ -111,8 +124,7 @@ impl<'a> Plan<'a> {
 
     /// The best places of `a` that is turned and lifted so.
     pub(super) fn places(&self, turn_rad: f64, lift_m: f64) -> Vec<Place> {
-        let reach = radius(self.a.surface);
-        let low = DVec3::new(-reach, -reach, self.low.z);
+        let low = DVec3::new(-self.reach_m, -self.reach_m, self.low.z);
         let lift = DVec3::new(0.0, 0.0, lift_m);
         let count = self.slabs.len();
         let slabs = self.images(self.a.surface, self.a.free, turn_rad, lift, low, count, true);
@@ -144,8 +156,9 @@ impl<'a> Plan<'a> {
         };
         let is_highest = |x: i64, y: i64| {
             let value = at(x, y);
-            let mut around =
-                (-APART..=APART).flat_map(|dy| (-APART..=APART).map(move |dx| (dx, dy))).filter(|d| *d != (0, 0));
+            let mut around = (-APART..=APART)
+                .flat_map(|dy| (-APART..=APART).map(move |dx| (dx, dy)))
+                .filter(|d| *d != (0, 0));
             around.all(|(dx, dy)| {
                 let other = at(x + dx, y + dy);
                 value > other || (value == other && (dy, dx) > (0, 0))
@@ -170,7 +183,7 @@ impl<'a> Plan<'a> {
             let part_y = vertex(at(x, y - 1), score, at(x, y + 1));
             // Beyond the size of `b`, shifts are negative.
             let wrapped = |v: i64, n: i64, most: f64| if v as f64 > most { v - n } else { v };
-            let most = [0, 1].map(|axis| self.size[axis] as f64 - radius(self.a.surface) / self.pixel_m);
+            let most = [0, 1].map(|axis| self.size[axis] as f64 - 2.0 * self.reach_m / self.pixel_m - 2.0);
             let x = wrapped(x, width, most[0]) as f64 + part_x;
             let y = wrapped(y, height, most[1]) as f64 + part_y;
             let shift = DVec3::new(x, y, 0.0) * self.pixel_m - low + self.low;

@@ -112,8 +112,7 @@ impl<'a> Pair<'a> {
                 _ => (place.apply_back(p), place.turn.inverse() * n),
             };
             let partner = self.grids[1 - side].nearest(q, m, &reach)? as usize;
-            let (partner, normal) =
-                (to.positions[partner].as_dvec3(), to.normals[partner].as_dvec3());
+            let (partner, normal) = (to.positions[partner].as_dvec3(), to.normals[partner].as_dvec3());
             let distance = normal.dot(q - partner);
             Some(match side {
                 0 => Match { from: q, normal, distance },
@@ -137,8 +136,8 @@ impl<'a> Pair<'a> {
         let every = self.points.map(|p| p.positions.len().div_ceil(most_points.max(1)));
         let mut open = Vec::new();
         for _ in 0..steps {
-            let found: [Vec<Match>; 2] = [0, 1]
-                .map(|side| self.partners(&place, side, reach, every[side]).flatten().collect());
+            let found: [Vec<Match>; 2] =
+                [0, 1].map(|side| self.partners(&place, side, reach, every[side]).flatten().collect());
             let (moved, next_open, largest, width) = step(&found, &place, unknown, WIDTH * reach)?;
             (place, open) = (moved, next_open);
             let least = reach_m[1].max(3.0 * width).min(reach_m[0]);
@@ -148,7 +147,9 @@ impl<'a> Pair<'a> {
             reach = least.max(0.7 * reach);
         }
         let distances = [0, 1].iter().flat_map(|&side| {
-            self.partners(&place, side, reach_m[1], every[side]).flatten().map(|m| m.distance)
+            self.partners(&place, side, reach_m[1], every[side])
+                .flatten()
+                .map(|m| m.distance)
         });
         let distances = distances.collect();
         Some(Settled { place, open, distances })
@@ -181,14 +182,21 @@ fn step(
             let arms = [Arm { place: Some(0), arm: m.from - middle }, Arm { place: None, arm: DVec3::ZERO }];
             let spread = 1.0 + (m.distance / width) * (m.distance / width);
             // A point of `b` is passed by the surface of `a`, which moves against its own distance.
-            let (normal, distance) = if side == 0 { (m.normal, m.distance) } else { (-m.normal, m.distance) };
+            let (normal, distance) = if side == 0 {
+                (m.normal, m.distance)
+            } else {
+                (-m.normal, m.distance)
+            };
             system.add(arms, normal, distance, 1.0 / (spread * spread));
         }
     }
 
     let (numbers, open) = system.solve(LEAST_SHARE);
     let mut motion = [0.0; 7];
-    unknown.iter().zip(&numbers).for_each(|(&at, number)| motion[at] = *number);
+    unknown
+        .iter()
+        .zip(&numbers)
+        .for_each(|(&at, number)| motion[at] = *number);
     let [x, y, z, u, v, w, grow] = motion;
     let turn = DQuat::from_scaled_axis(DVec3::new(u, v, w));
     let scale = 1.0 + grow.clamp(-0.5, 0.5);

@@ -40,7 +40,11 @@ pub(super) fn score(
         let weight_m2 = 0.5 * pair.cell_m * pair.cell_m * every[side].max(1) as f64;
 
         for ((p, n), partner) in all.zip(pair.partners(place, side, near_m, every[side])) {
-            let weight = if n.z.abs() >= LEVEL { f64::from(FLOOR_WEIGHT) } else { 1.0 };
+            let weight = if n.z.abs() >= LEVEL {
+                f64::from(FLOOR_WEIGHT)
+            } else {
+                1.0
+            };
             if partner.is_some() {
                 score.overlap[side] += 1.0 / count;
                 fits += weight * weight_m2;

@@ -11,6 +11,8 @@ use s3d_geom::{Density, PointCloud, SurfaceSampler, TriMesh};
 const CELL_M: f64 = 0.06;
 /// About so many points are kept at most.
 const MOST_POINTS: f64 = 400_000.0;
+/// Surfaces that are small, since their unit is unknown, have about so many.
+const FEW_POINTS: f64 = 5_000.0;
 /// The fewest points that are a surface: a quarter of a square metre.
 const LEAST_POINTS: usize = 100;
 /// Normals are found in this many cubes around a point.
@@ -38,7 +40,9 @@ impl SurfacePoints {
     /// [`AlignError::Thin`] if the surface is too small.
     pub fn of_mesh(mesh: &TriMesh) -> Result<Self, AlignError> {
         let area_m2 = mesh.total_area();
-        let cell_m = CELL_M.max((area_m2 / MOST_POINTS).sqrt());
+        let cell_m = CELL_M
+            .min((area_m2 / FEW_POINTS).sqrt())
+            .max((area_m2 / MOST_POINTS).sqrt());
         let sampler = SurfaceSampler::new(mesh, Density::PerM2(DRAWN / (cell_m * cell_m)), 0);
         let mut cloud = PointCloud::default();
         sampler.sample(0..sampler.len(), &mut cloud);
@@ -57,7 +61,10 @@ impl SurfacePoints {
         let kept: Vec<usize> = (0..positions.len()).filter(finite).collect();
         let sum: DVec3 = kept.iter().map(|i| positions[*i].as_dvec3()).sum();
         let middle = (sum / kept.len().max(1) as f64).round();
-        let near: Vec<Vec3> = kept.iter().map(|i| (positions[*i].as_dvec3() - middle).as_vec3()).collect();
+        let near: Vec<Vec3> = kept
+            .iter()
+            .map(|i| (positions[*i].as_dvec3() - middle).as_vec3())
+            .collect();
         let sides: Vec<Vec3> = match has_sides {
             true => kept.iter().map(|i| sides[*i].normalize_or(Vec3::Z)).collect(),
             false => Vec::new(),
@@ -93,6 +100,17 @@ impl SurfacePoints {
         self.points.positions.len() as f64 * self.cell_m * self.cell_m
     }
 
+    /// How far it reaches from its middle on the average, metres.
+    pub(super) fn size_m(&self) -> f64 {
+        let squares: f64 = self
+            .points
+            .positions
+            .iter()
+            .map(|p| p.as_dvec3().length_squared())
+            .sum();
+        (squares / self.points.positions.len().max(1) as f64).sqrt()
+    }
+
     /// The same surface turned and grown about its middle.
     pub(super) fn turned(&self, turn: DQuat, scale: f64) -> Self {
         let positions = self.points.positions.iter();
@@ -110,20 +128,26 @@ impl SurfacePoints {
     }
 }
 
-/// The edge of cubes that leaves about [`MOST_POINTS`] of a cloud.
+/// The edge of cubes that leaves neither too many nor too few points of a cloud.
 fn wide_enough(positions: &[Vec3]) -> f64 {
-    let mut cell_m = CELL_M;
-    loop {
+    let filled = |cell_m: f64| {
         let mut cubes: Vec<[i32; 3]> = positions.par_iter().map(|p| cube(*p, cell_m)).collect();
-        if (cubes.len() as f64) <= MOST_POINTS {
-            return cell_m;
-        }
         cubes.par_sort_unstable();
         cubes.dedup();
-        if (cubes.len() as f64) <= MOST_POINTS {
-            return cell_m;
-        }
-        cell_m *= (cubes.len() as f64 / MOST_POINTS).sqrt().max(1.1);
+        cubes.len() as f64
+    };
+    let mut cell_m = CELL_M;
+    let mut count = filled(cell_m);
+    while count > MOST_POINTS {
+        cell_m *= (count / MOST_POINTS).sqrt().max(1.1);
+        count = filled(cell_m);
+    }
+    // A cube of a thin cloud needs some points all the same.
+    let few = FEW_POINTS.min(positions.len() as f64 / DRAWN);
+    if count < few {
+        cell_m * (count.max(1.0) / few).sqrt()
+    } else {
+        cell_m
     }
 }
 

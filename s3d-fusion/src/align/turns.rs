@@ -59,9 +59,15 @@ pub(super) fn turns(a: &SurfacePoints, b: &SurfacePoints) -> Vec<f64> {
     let best: Vec<f64> = found.iter().map(|(_, turn)| *turn).collect();
     let mut turns = best.clone();
     for quarter in 1..4 {
-        let more = best.iter().take(QUARTERED).map(|turn| (turn + f64::from(quarter) * TAU / 4.0) % TAU);
+        let more = best
+            .iter()
+            .take(QUARTERED)
+            .map(|turn| (turn + f64::from(quarter) * TAU / 4.0) % TAU);
         for turn in more {
-            if turns.iter().all(|other| (turn - other + 0.5 * TAU).rem_euclid(TAU) - 0.5 * TAU > SAME_RAD || (turn - other + 0.5 * TAU).rem_euclid(TAU) - 0.5 * TAU < -SAME_RAD) {
+            if turns.iter().all(|other| {
+                (turn - other + 0.5 * TAU).rem_euclid(TAU) - 0.5 * TAU > SAME_RAD
+                    || (turn - other + 0.5 * TAU).rem_euclid(TAU) - 0.5 * TAU < -SAME_RAD
+            }) {
                 turns.push(turn);
             }
         }

@@ -168,12 +168,18 @@ impl<'a> Mover<'a> {
     pub(super) fn told(&self, open: &Open) -> OpenMotion {
         let largest = open.motion.iter().fold(0.0, |largest: f64, m| largest.max(m.abs()));
         let scaled: Vec<f64> = open.motion.iter().map(|m| m / largest.max(f64::MIN_POSITIVE)).collect();
-        let motions = self.moving.iter().zip(scaled.chunks_exact(RIGID.len())).filter_map(|(&scan, m)| {
-            let motion =
-                Motion { translation: DVec3::new(m[0], m[1], m[2]), rotation: DVec3::new(m[3], m[4], m[5]) };
-            let moves = motion.translation.length().max(motion.rotation.length()) > 0.05;
-            moves.then_some((scan, motion))
-        });
+        let motions = self
+            .moving
+            .iter()
+            .zip(scaled.chunks_exact(RIGID.len()))
+            .filter_map(|(&scan, m)| {
+                let motion = Motion {
+                    translation: DVec3::new(m[0], m[1], m[2]),
+                    rotation: DVec3::new(m[3], m[4], m[5]),
+                };
+                let moves = motion.translation.length().max(motion.rotation.length()) > 0.05;
+                moves.then_some((scan, motion))
+            });
         OpenMotion { share: open.share, motions: motions.collect() }
     }
 }
