@@ -60,6 +60,9 @@ pub struct Alignment {
     pub against: [f64; 2],
     /// What speaks against the place, as a share of all that says something, 0 to 1; floors count less.
     pub contradiction: f64,
+    /// The evidence as a share of what lies on each other, up to 1. It is less if surfaces stand in room, or lie
+    /// beside each other by some centimetres.
+    pub agreement: f64,
     /// What speaks for the place less four times what speaks against it, square metres; floors count less.
     /// Places are ordered by it.
     pub evidence_m2: f64,
@@ -96,8 +99,10 @@ pub enum Doubt {
 const LEAST_OVERLAP: f64 = 0.08;
 /// More contradicts only at wrong places, even if things were moved between two scans.
 const MOST_CONTRADICTION: f64 = 0.06;
+/// The evidence of a place must be this share of what lies on each other.
+const LEAST_AGREEMENT: f64 = 0.5;
 /// The second-best place is a rival if it has this share of the evidence of the best.
-const RIVAL: f64 = 0.6;
+const RIVAL: f64 = 0.5;
 /// A surface that is larger by this factor has another unit.
 const UNITS: f64 = 100.0;
 
@@ -136,16 +141,19 @@ pub enum AlignError {
     NoHeights,
     /// No place fits.
     #[error(
-        "nothing fits: at the best place, {:.0} % of the smaller one lie on the other one, and {:.0} % of what \
-         is seen of both contradicts",
+        "nothing fits: at the best place, {:.0} % of the smaller one lie on the other one, {:.0} % of what is \
+         seen of both contradicts, and the evidence is {:.0} % of what lies on each other",
         100.0 * .overlap,
-        100.0 * .contradiction
+        100.0 * .contradiction,
+        100.0 * .agreement
     )]
     NoFit {
         /// The share of the smaller surface that lies on the other one, at the best place.
         overlap: f64,
         /// What speaks against this place, as [`Alignment::contradiction`].
         contradiction: f64,
+        /// The same as [`Alignment::agreement`].
+        agreement: f64,
     },
 }
 
@@ -187,10 +195,12 @@ pub fn align(a: &SurfacePoints, b: &SurfacePoints, options: &AlignOptions) -> Re
     let places = search.places();
     let overlap = |place: &Alignment| place.overlap[0].max(place.overlap[1]);
     let Some(best) = places.first() else {
-        return Err(AlignError::NoFit { overlap: 0.0, contradiction: 0.0 });
+        return Err(AlignError::NoFit { overlap: 0.0, contradiction: 0.0, agreement: 0.0 });
     };
-    if overlap(best) < LEAST_OVERLAP || best.contradiction > MOST_CONTRADICTION {
-        return Err(AlignError::NoFit { overlap: overlap(best), contradiction: best.contradiction });
+    let contradicts = best.contradiction > MOST_CONTRADICTION || best.agreement < LEAST_AGREEMENT;
+    if overlap(best) < LEAST_OVERLAP || contradicts {
+        let Alignment { contradiction, agreement, .. } = *best;
+        return Err(AlignError::NoFit { overlap: overlap(best), contradiction, agreement });
     }
     Ok(Aligned { places })
 }

@@ -15,6 +15,8 @@ pub(super) struct Score {
     pub(super) evidence_m2: f64,
     /// The points that speak against the place, as a share of all that say something.
     pub(super) contradiction: f64,
+    /// The evidence as a share of what fits.
+    pub(super) agreement: f64,
 }
 
 /// A point where the other surface has room counts as so many that fit. Surfaces of one building hardly
@@ -23,32 +25,38 @@ const AGAINST: f64 = 4.0;
 /// The least cosine of a floor's normal with the upright axis.
 const LEVEL: f32 = 0.8;
 
-/// Looks at each `every`th point of both surfaces. Surfaces within `near_m` are the same.
+/// Looks at each `every`th point of both surfaces. Surfaces within `near_m` are the same. What lies beside a
+/// surface that looks the same way, up to `beside_m`, speaks against the place too, but only once: small
+/// things are moved more easily than walls.
 pub(super) fn score(
     pair: &Pair<'_>,
     free: [&FreeSpace; 2],
     place: &Similarity,
-    near_m: f64,
+    [near_m, beside_m]: [f64; 2],
     every: [usize; 2],
 ) -> Score {
     let mut score = Score::default();
-    let (mut fits, mut contradicts) = (0.0, 0.0);
+    let (mut fits, mut contradicts, mut beside) = (0.0, 0.0, 0.0);
     for side in 0..2 {
         let points = pair.points[side];
         let all = points.positions.iter().zip(&points.normals).step_by(every[side].max(1));
         let count = all.len().max(1) as f64;
         let weight_m2 = 0.5 * pair.cell_m * pair.cell_m * every[side].max(1) as f64;
 
-        for ((p, n), partner) in all.zip(pair.partners(place, side, near_m, every[side])) {
+        for ((p, n), partner) in all.zip(pair.partners(place, side, beside_m, every[side])) {
             let weight = if n.z.abs() >= LEVEL {
                 f64::from(FLOOR_WEIGHT)
             } else {
                 1.0
             };
-            if partner.is_some() {
-                score.overlap[side] += 1.0 / count;
-                fits += weight * weight_m2;
-                continue;
+            match partner {
+                Some(partner) if partner.distance.abs() <= near_m => {
+                    score.overlap[side] += 1.0 / count;
+                    fits += weight * weight_m2;
+                    continue;
+                }
+                Some(_) => beside += weight * weight_m2,
+                None => (),
             }
             let there = match side {
                 0 => place.apply(p.as_dvec3()),
@@ -60,7 +68,8 @@ pub(super) fn score(
             }
         }
     }
-    score.evidence_m2 = fits - AGAINST * contradicts;
+    score.evidence_m2 = fits - beside - AGAINST * contradicts;
+    score.agreement = score.evidence_m2 / fits.max(f64::MIN_POSITIVE);
     score.contradiction = contradicts / (fits + contradicts).max(f64::MIN_POSITIVE);
     score
 }

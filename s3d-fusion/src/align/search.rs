@@ -70,6 +70,10 @@ const BESIDE_M: f64 = 0.25;
 /// these bounds, metres.
 const NEAR: f64 = 3.0;
 const NEAR_M: [f64; 2] = [0.006, 0.02];
+/// In the end, a surface this far beside another one is not the same, metres.
+const OFF_M: f64 = 0.28;
+/// So many points are looked at in the end.
+const MOST_SCORED: usize = 8_000;
 
 /// The first surface, as it is or turned and grown.
 struct View {
@@ -226,7 +230,7 @@ impl<'a> Search<'a> {
                 let settled =
                     pair.refined(f.place, unknown, level.reach_m, level.steps, level.most_points)?;
                 let free = [&view.free, &self.free_b];
-                let score = score(&pair, free, &settled.place, level.near_m, every);
+                let score = score(&pair, free, &settled.place, [level.near_m; 2], every);
                 Some(Found { view: number, place: settled.place, score })
             });
             all.extend(moved.collect::<Vec<_>>().into_iter().flatten());
@@ -250,13 +254,14 @@ impl<'a> Search<'a> {
     /// Both surfaces with all their points.
     fn pair<'s>(&'s self, view: &'s View, level: &Level) -> Pair<'s> {
         let cell_m = level.cell_m.max(self.b.cell_m).max(view.a.cell_m);
-        Pair::new([&view.a.points, &self.b.points], cell_m, level.reach_m[0], self.is_two_sided())
+        Pair::new([&view.a.points, &self.b.points], cell_m, OFF_M, self.is_two_sided())
     }
 
     /// A place in the frames that were given, with what is known of it.
     fn told(&self, view: usize, pair: &Pair<'_>, settled: &Settled, near_m: f64) -> Alignment {
         let view = &self.views[view];
-        let score = score(pair, [&view.free, &self.free_b], &settled.place, near_m, [1, 1]);
+        let every = pair.points.map(|p| p.positions.len().div_ceil(MOST_SCORED));
+        let score = score(pair, [&view.free, &self.free_b], &settled.place, [near_m, OFF_M], every);
         let squares = settled.distances.iter().map(|d| d * d).sum::<f64>();
 
         let back = Similarity { turn: self.of_b.inverse(), scale: 1.0, shift: DVec3::ZERO };
@@ -271,6 +276,7 @@ impl<'a> Search<'a> {
             overlap: score.overlap,
             against: score.against,
             contradiction: score.contradiction,
+            agreement: score.agreement,
             evidence_m2: score.evidence_m2,
             median_m: median(&settled.distances),
             rms_m: (squares / settled.distances.len().max(1) as f64).sqrt(),

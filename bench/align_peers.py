@@ -1,0 +1,142 @@
+"""Whether `s3d align` finds what Open3D's FPFH with RANSAC finds, on the same pairs, and in what processor time.
+
+    cargo build --release -p s3d-cli
+    cargo run --release -p s3d-fusion --example align_pairs -- PAIRS shared/scans/copyroom/rgb.obj
+    python3 -m venv o3d && o3d/bin/pip install open3d==0.19.0 numpy
+    o3d/bin/python bench/align_peers.py target/release/s3d PAIRS
+
+An answer is right within 5 mm at the middle of the first part and 0.05°, and near within 5 cm and 1°. A pair is
+refused if `s3d align` exits with 1. Open3D always answers; its answer counts as refused if less than a tenth of the
+points of the first part have a partner within 5 cm. The time is the user's and system's of the whole process.
+"""
+
+import csv
+import os
+import subprocess
+import sys
+import tomllib
+
+import numpy as np
+
+VOXEL_M = 0.05
+LEAST_FITNESS = 0.1
+
+
+def with_open3d(a, b):
+    """Prints the transform that Open3D finds, and its fitness: the recipe of its tutorial on global registration."""
+    import open3d as o3d
+
+    o3d.utility.random.seed(0)
+    registration = o3d.pipelines.registration
+
+    def cloud_of(path):
+        mesh = o3d.io.read_triangle_mesh(path)
+        count = int(mesh.get_surface_area() * 800)
+        cloud = mesh.sample_points_uniformly(count, use_triangle_normal=True).voxel_down_sample(VOXEL_M)
+        sides = np.asarray(cloud.normals).copy()
+        near = o3d.geometry.KDTreeSearchParamHybrid(2 * VOXEL_M, 30)
+        cloud.estimate_normals(near)
+        # To the side that the mesh shows.
+        normals = np.asarray(cloud.normals)
+        normals[np.einsum("ij,ij->i", normals, sides) < 0] *= -1
+        wide = o3d.geometry.KDTreeSearchParamHybrid(5 * VOXEL_M, 100)
+        return cloud, registration.compute_fpfh_feature(cloud, wide)
+
+    (cloud_a, features_a), (cloud_b, features_b) = cloud_of(a), cloud_of(b)
+    reach = 1.5 * VOXEL_M
+    found = registration.registration_ransac_based_on_feature_matching(
+        cloud_a, cloud_b, features_a, features_b, True, reach,
+        registration.TransformationEstimationPointToPoint(False), 3,
+        [
+            registration.CorrespondenceCheckerBasedOnEdgeLength(0.9),
+            registration.CorrespondenceCheckerBasedOnDistance(reach),
+        ],
+        registration.RANSACConvergenceCriteria(4_000_000, 0.999),
+    )  # fmt: skip
+    plane = registration.TransformationEstimationPointToPlane()
+    found = registration.registration_icp(cloud_a, cloud_b, VOXEL_M, found.transformation, plane)
+    found = registration.registration_icp(cloud_a, cloud_b, 0.4 * VOXEL_M, found.transformation, plane)
+    fitness = registration.evaluate_registration(cloud_a, cloud_b, VOXEL_M, found.transformation).fitness
+    print(np.asarray(found.transformation).tolist(), fitness, sep="\n")
+
+
+def timed(command):
+    """Runs a command; returns its exit code, its output, and its processor seconds."""
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as process:
+        text = process.stdout.read().decode()
+        _, status, usage = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
+        return process.returncode, text, usage.ru_utime + usage.ru_stime
+
+
+def by_s3d(s3d, a, b):
+    """Returns the transform or None, and processor seconds."""
+    frame = ["--up-a", "z", "--up-b", "z", "--units-a", "m", "--units-b", "m"]
+    code, text, seconds = timed([s3d, "align", a, b, *frame])
+    return (np.array(tomllib.loads(text)["transform"]) if code == 0 else None), seconds
+
+
+def by_open3d(a, b):
+    """Returns the transform or None, and processor seconds."""
+    code, text, seconds = timed([sys.executable, __file__, "--open3d", a, b])
+    if code != 0:
+        return None, seconds
+    transform, fitness = text.strip().split("\n")[-2:]
+    found = np.array(eval(transform, {"__builtins__": {}}))  # noqa: S307, what this file printed
+    return (found if float(fitness) >= LEAST_FITNESS else None), seconds
+
+
+def middle_of(path):
+    """Returns the middle of the box of a part."""
+    with open(path, "rb") as file:
+        data = file.read()
+    header = data[: data.index(b"end_header\n") + 11]
+    count = int(next(line for line in header.split(b"\n") if line.startswith(b"element vertex")).split()[2])
+    points = np.frombuffer(data, "<f4", 3 * count, len(header)).reshape(-1, 3).astype(float)
+    return (points.min(0) + points.max(0)) / 2
+
+
+def judged(found, truth, middle, is_pair):
+    """Returns a word for an answer."""
+    if found is None:
+        return "refused"
+    if not is_pair:
+        return "wrong"
+    off = np.linalg.norm(found[:3, :3] @ middle + found[:3, 3] - truth[:3, :3] @ middle - truth[:3, 3])
+    turn = found[:3, :3] @ truth[:3, :3].T
+    angle = np.degrees(np.arcsin(min(1.0, np.linalg.norm(turn - turn.T) / np.sqrt(8))))
+    angle = angle if np.trace(turn) > 1 else 180 - angle
+    if off <= 0.005 and angle <= 0.05:
+        return "right"
+    return "near" if off <= 0.05 and angle <= 1 else "wrong"
+
+
+def main(s3d, folder):
+    """Compares both on all pairs of a folder."""
+    counts, seconds = {}, {}
+    with open(os.path.join(folder, "pairs.csv"), newline="") as file:
+        rows = list(csv.DictReader(file))
+    for row in rows:
+        a, b = (os.path.join(folder, f"{row['name']}_{part}.ply") for part in "ab")
+        truth = np.array([[float(row[f"m{i}{j}"]) for j in range(4)] for i in range(3)])
+        is_pair, middle = float(row["overlap"]) > 0, middle_of(a)
+        line = f"{row['name']:16} overlap {float(row['overlap']):.2f}"
+        for program, (found, time) in {"s3d": by_s3d(s3d, a, b), "Open3D": by_open3d(a, b)}.items():
+            word = judged(found, truth, middle, is_pair)
+            key = (program, is_pair)
+            counts.setdefault(key, {}).setdefault(word, 0)
+            counts[key][word] += 1
+            seconds.setdefault(program, []).append(time)
+            line += f"  {program} {word} {time:.1f} s"
+        print(line, flush=True)
+    for (program, is_pair), words in counts.items():
+        print(program, "pairs that overlap:" if is_pair else "pairs that do not:", words)
+    for program, times in seconds.items():
+        print(f"{program}: {sum(times):.0f} s of a processor, median {np.median(times):.1f} s")
+
+
+if __name__ == "__main__":
+    if sys.argv[1] == "--open3d":
+        with_open3d(*sys.argv[2:])
+    else:
+        main(*sys.argv[1:])
