@@ -1,10 +1,13 @@
-//! Writes pairs of parts of buildings, for `bench/align_peers.py`: `align_pairs OUT [copyroom/rgb.obj]`.
+//! Writes pairs of parts of buildings, for `bench/align_peers.py`: `align_pairs OUT [copyroom/rgb.obj]`. With
+//! two of these files, prints what `s3d align` prints of the transform: `align_pairs align A.ply B.ply`. So the
+//! library is measured without a build of the whole command.
 //!
 //! Parts are cut by upright planes in any direction, moved by up to 42 m and turned by any angle, and each
 //! vertex is off by 5 mm (one sigma and axis). Of each scene, eight pairs share 10 to 50 % of the second part,
 //! and two share nothing: another part of the same building, and a part of another one.
 #![allow(clippy::print_stdout)]
 
+use s3d_fusion::{AlignOptions, SurfacePoints, align};
 use s3d_geom::TriMesh;
 use s3d_geom::glam::{DAffine3, DQuat, DVec3, Vec3, dvec3};
 use s3d_synth::{Building, BuildingOptions};
@@ -143,8 +146,51 @@ fn obj(path: &str) -> Result<TriMesh, Box<dyn Error>> {
     Ok(TriMesh::from_faces(positions, faces)?)
 }
 
+/// A mesh that [`write_part`] wrote.
+fn read_part(path: &str) -> Result<TriMesh, Box<dyn Error>> {
+    let file = fs::read(path)?;
+    let end = file.windows(11).position(|w| w == b"end_header\n").ok_or("no header")? + 11;
+    let header = String::from_utf8_lossy(&file[..end]).into_owned();
+    let count = |noun: &str| -> Result<usize, Box<dyn Error>> {
+        let line = header
+            .lines()
+            .find_map(|line| line.strip_prefix(noun))
+            .ok_or("no count")?;
+        Ok(line.trim().parse()?)
+    };
+    let (vertices, faces) = (count("element vertex")?, count("element face")?);
+    let (points, corners) = file[end..].split_at(12 * vertices);
+    let word = |bytes: &[u8], at: usize| [0, 1, 2, 3].map(|i| bytes[at + i]);
+    let float = |at: usize| f32::from_le_bytes(word(points, at));
+    let positions = (0..vertices).map(|v| Vec3::new(float(12 * v), float(12 * v + 4), float(12 * v + 8)));
+    let corner = |f: usize, k: usize| u32::from_le_bytes(word(corners, 13 * f + 1 + 4 * k));
+    let faces = (0..faces).map(|f| [corner(f, 0), corner(f, 1), corner(f, 2)]).collect();
+    Ok(TriMesh::from_faces(positions.collect(), faces)?)
+}
+
+/// Prints the transform of two files as TOML; an error if there is no single answer.
+fn align_two(a: &str, b: &str) -> Result<(), Box<dyn Error>> {
+    let [a, b] = [SurfacePoints::of_mesh(&read_part(a)?)?, SurfacePoints::of_mesh(&read_part(b)?)?];
+    let aligned = align(&a, &b, &AlignOptions::default())?;
+    if let Some(doubt) = aligned.doubt() {
+        return Err(format!("{doubt:?}").into());
+    }
+    let found = &aligned.places[0].b_from_a;
+    let rows = [0, 1, 2].map(|row| {
+        let m = found.matrix3.row(row);
+        format!("[{:?}, {:?}, {:?}, {:?}]", m.x, m.y, m.z, found.translation[row])
+    });
+    println!("transform = [{}, [0.0, 0.0, 0.0, 1.0]]", rows.join(", "));
+    Ok(())
+}
+
 fn main() -> Result<(), Box<dyn Error>> {
     let args: Vec<String> = env::args().collect();
+    if let [_, word, a, b] = &args[..]
+        && word == "align"
+    {
+        return align_two(a, b);
+    }
     let out = Path::new(args.get(1).ok_or("give a folder")?);
     fs::create_dir_all(out)?;
     let built = |building: Building| -> Result<Fine, Box<dyn Error>> {

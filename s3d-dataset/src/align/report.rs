@@ -103,8 +103,8 @@ fn numbers(v: DVec3) -> String {
 fn sentence(aligned: &Aligned, doubt: Doubt) -> String {
     match doubt {
         Doubt::Rival { share } => format!(
-            "there are several answers: the second-best place has {:.0} % of the evidence of the best; look \
-             at both, and choose with",
+            "there are several answers: another place has {:.0} % of the evidence of the best; look at both, \
+             and choose with",
             100.0 * share
         ),
         _ => {

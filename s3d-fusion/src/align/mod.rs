@@ -86,9 +86,9 @@ pub struct Aligned {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Doubt {
-    /// The second-best place is nearly as good.
+    /// Another place is nearly as good.
     Rival {
-        /// The evidence of the second-best place as a share of the best one's.
+        /// The evidence of the other place as a share of the best one's.
         share: f64,
     },
     /// Nothing fixes a motion.
@@ -101,20 +101,25 @@ const LEAST_OVERLAP: f64 = 0.08;
 const MOST_CONTRADICTION: f64 = 0.06;
 /// The evidence of a place must be this share of what lies on each other.
 const LEAST_AGREEMENT: f64 = 0.5;
-/// The second-best place is a rival if it has this share of the evidence of the best.
+/// Another place is a rival if it has this share of the evidence of the best, and agrees nearly as well.
+/// A room without its furniture fits both ways, and furniture then tells.
 const RIVAL: f64 = 0.5;
+const LESS_AGREEMENT: f64 = 0.06;
 /// A surface that is larger by this factor has another unit.
 const UNITS: f64 = 100.0;
 
 impl Aligned {
     /// Returns why the best place is no answer, if it is none.
     pub fn doubt(&self) -> Option<Doubt> {
-        let [best, second] = [0, 1].map(|i| self.places.get(i));
-        if best.is_some_and(|best| !best.open.is_empty()) {
+        let (best, others) = self.places.split_first()?;
+        if !best.open.is_empty() {
             return Some(Doubt::Open);
         }
-        let share = second?.evidence_m2 / best?.evidence_m2;
-        (share >= RIVAL).then_some(Doubt::Rival { share })
+        let share = |other: &Alignment| other.evidence_m2 / best.evidence_m2;
+        let rival = others
+            .iter()
+            .find(|other| share(other) >= RIVAL && other.agreement >= best.agreement - LESS_AGREEMENT)?;
+        Some(Doubt::Rival { share: share(rival) })
     }
 }
 

@@ -16,11 +16,13 @@ pub(super) struct Neighbours<'a> {
 /// The fewest points that make a plane.
 const LEAST_POINTS: usize = 6;
 /// How often the points off the plane lose weight.
-const ROUNDS: usize = 2;
+const ROUNDS: usize = 3;
 /// The least width of the weights, metres.
 const LEAST_WIDTH_M: f64 = 0.003;
 /// Points are on a surface if they spread less than this across it, as a share of the second largest spread.
 const FLAT: f64 = 0.1;
+/// They are a line if the second largest spread is less than this share of the largest.
+const NARROW: f64 = 0.02;
 /// The share of the weight that must be left near the plane.
 const LEAST_NEAR: f64 = 0.35;
 
@@ -40,14 +42,23 @@ impl<'a> Neighbours<'a> {
         if near.len() < LEAST_POINTS {
             return None;
         }
-        let mut weights = vec![1.0; near.len()];
+        // Beside an edge, what is near is mostly on the same side of it.
+        let closeness: Vec<f64> = near
+            .iter()
+            .map(|q| {
+                let share = 1.0 - p.distance_squared(*q) / (self.radius_m * self.radius_m);
+                share * share
+            })
+            .collect();
+        let mut weights = closeness.clone();
         let mut found = (p, DVec3::Z);
         for round in 0..=ROUNDS {
             let (middle, normal, spreads) = plane(&near, &weights)?;
             found = (p - normal * normal.dot(p - middle), normal);
             if round == ROUNDS {
-                let share = weights.iter().sum::<f64>() / near.len() as f64;
-                if spreads[0] > FLAT * spreads[1] || share < LEAST_NEAR {
+                let share = weights.iter().sum::<f64>() / closeness.iter().sum::<f64>();
+                let is_flat = spreads[0] < FLAT * spreads[1] && spreads[1] > NARROW * spreads[2];
+                if !is_flat || share < LEAST_NEAR {
                     return None;
                 }
                 break;
@@ -58,9 +69,9 @@ impl<'a> Neighbours<'a> {
             let half = sizes.len() / 2;
             let (_, median, _) = sizes.select_nth_unstable_by(half, f64::total_cmp);
             let width = (3.0 * *median).max(LEAST_WIDTH_M);
-            for (weight, distance) in weights.iter_mut().zip(&distances) {
+            for ((weight, close), distance) in weights.iter_mut().zip(&closeness).zip(&distances) {
                 let spread = 1.0 + (distance / width) * (distance / width);
-                *weight = 1.0 / (spread * spread);
+                *weight = close / (spread * spread);
             }
         }
 

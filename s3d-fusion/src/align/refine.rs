@@ -44,8 +44,9 @@ pub(super) fn unknown(is_level: bool, with_scale: bool) -> &'static [usize] {
 pub(super) struct Pair<'a> {
     pub(super) points: [&'a ScanPoints; 2],
     pub(super) grids: [Grid<'a>; 2],
-    /// The distance between neighbours, metres.
-    pub(super) cell_m: f64,
+    /// The distance between neighbours of each surface, and the larger one, metres.
+    pub(super) spacing_m: [f64; 2],
+    cell_m: f64,
     pub(super) is_two_sided: bool,
 }
 
@@ -80,9 +81,15 @@ const LEAST_MATCHES: usize = 30;
 
 impl<'a> Pair<'a> {
     /// `reach_m` is the largest distance along normals that will be asked for.
-    pub(super) fn new(points: [&'a ScanPoints; 2], cell_m: f64, reach_m: f64, is_two_sided: bool) -> Self {
+    pub(super) fn new(
+        points: [&'a ScanPoints; 2],
+        spacing_m: [f64; 2],
+        reach_m: f64,
+        is_two_sided: bool,
+    ) -> Self {
+        let cell_m = spacing_m[0].max(spacing_m[1]);
         let edge_m = reach_m.hypot(1.5 * cell_m);
-        Self { points, grids: points.map(|p| Grid::new(p, edge_m)), cell_m, is_two_sided }
+        Self { points, grids: points.map(|p| Grid::new(p, edge_m)), spacing_m, cell_m, is_two_sided }
     }
 
     fn reach(&self, along_m: f64) -> Reach {

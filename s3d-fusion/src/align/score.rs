@@ -36,12 +36,13 @@ pub(super) fn score(
     every: [usize; 2],
 ) -> Score {
     let mut score = Score::default();
-    let (mut fits, mut contradicts, mut beside) = (0.0, 0.0, 0.0);
+    let mut fits = [0.0; 2];
+    let (mut contradicts, mut beside) = (0.0, 0.0);
     for side in 0..2 {
         let points = pair.points[side];
         let all = points.positions.iter().zip(&points.normals).step_by(every[side].max(1));
         let count = all.len().max(1) as f64;
-        let weight_m2 = 0.5 * pair.cell_m * pair.cell_m * every[side].max(1) as f64;
+        let weight_m2 = pair.spacing_m[side] * pair.spacing_m[side] * every[side].max(1) as f64;
 
         for ((p, n), partner) in all.zip(pair.partners(place, side, beside_m, every[side])) {
             let weight = if n.z.abs() >= LEVEL {
@@ -52,10 +53,10 @@ pub(super) fn score(
             match partner {
                 Some(partner) if partner.distance.abs() <= near_m => {
                     score.overlap[side] += 1.0 / count;
-                    fits += weight * weight_m2;
+                    fits[side] += weight * weight_m2;
                     continue;
                 }
-                Some(_) => beside += weight * weight_m2,
+                Some(_) => beside += 0.5 * weight * weight_m2,
                 None => (),
             }
             let there = match side {
@@ -64,10 +65,12 @@ pub(super) fn score(
             };
             if free[1 - side].contains(there.as_vec3()) {
                 score.against[side] += 1.0 / count;
-                contradicts += weight * weight_m2;
+                contradicts += 0.5 * weight * weight_m2;
             }
         }
     }
+    // What lies on each other has one area. A large surface beside a small one cannot have more.
+    let fits = fits[0].min(fits[1]);
     score.evidence_m2 = fits - beside - AGAINST * contradicts;
     score.agreement = score.evidence_m2 / fits.max(f64::MIN_POSITIVE);
     score.contradiction = contradicts / (fits + contradicts).max(f64::MIN_POSITIVE);

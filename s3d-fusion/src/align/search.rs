@@ -45,7 +45,7 @@ const LEVELS: [Level; 3] = [
         near_m: 0.04,
         steps: 8,
         most_points: 4_000,
-        places: 20,
+        places: 32,
         same_m: 0.06,
     },
     Level {
@@ -54,7 +54,7 @@ const LEVELS: [Level; 3] = [
         near_m: 0.02,
         steps: 25,
         most_points: 40_000,
-        places: 6,
+        places: 10,
         same_m: 0.03,
     },
 ];
@@ -156,10 +156,8 @@ impl<'a> Search<'a> {
         }
 
         let last = &LEVELS[LEVELS.len() - 1];
-        let pairs: Vec<(&Found, Pair<'_>)> = found
-            .iter()
-            .map(|f| (f, self.pair(&self.views[f.view], last)))
-            .collect();
+        let pairs: Vec<(&Found, Pair<'_>)> =
+            found.iter().map(|f| (f, self.pair(&self.views[f.view]))).collect();
         let settled: Vec<(&Found, &Pair<'_>, Settled)> = pairs
             .par_iter()
             .filter_map(|(f, pair)| {
@@ -224,7 +222,8 @@ impl<'a> Search<'a> {
             let cell_m = level.cell_m.max(self.b.cell_m).max(view.a.cell_m);
             let coarse = [&view.a, &self.b].map(|s| s.coarse(cell_m));
             let reach_m = level.reach_m[0];
-            let pair = Pair::new([&coarse[0], &coarse[1]], cell_m, reach_m, self.is_two_sided());
+            let two_sided = self.is_two_sided();
+            let pair = Pair::new([&coarse[0], &coarse[1]], [cell_m; 2], reach_m, two_sided);
             let every = coarse.each_ref().map(|p| p.positions.len().div_ceil(level.most_points));
             let moved = here.par_iter().map(|f| {
                 let settled =
@@ -252,9 +251,9 @@ impl<'a> Search<'a> {
     }
 
     /// Both surfaces with all their points.
-    fn pair<'s>(&'s self, view: &'s View, level: &Level) -> Pair<'s> {
-        let cell_m = level.cell_m.max(self.b.cell_m).max(view.a.cell_m);
-        Pair::new([&view.a.points, &self.b.points], cell_m, OFF_M, self.is_two_sided())
+    fn pair<'s>(&'s self, view: &'s View) -> Pair<'s> {
+        let spacing_m = [view.a.cell_m, self.b.cell_m];
+        Pair::new([&view.a.points, &self.b.points], spacing_m, OFF_M, self.is_two_sided())
     }
 
     /// A place in the frames that were given, with what is known of it.
