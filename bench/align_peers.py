@@ -21,7 +21,8 @@ import tomllib
 
 import numpy as np
 
-VOXEL_M = 0.05
+# Points of Open3D's features, and of its last steps: with 5 cm for both, a pair of this size takes minutes.
+VOXEL_M, FINE_M = 0.1, 0.05
 LEAST_FITNESS = 0.1
 
 
@@ -33,20 +34,21 @@ def with_open3d(a, b):
     o3d.utility.random.seed(0)
     registration = o3d.pipelines.registration
 
-    def cloud_of(path):
+    def cloud_of(path, voxel_m):
         mesh = o3d.io.read_triangle_mesh(path)
         count = int(mesh.get_surface_area() * 800)
-        cloud = mesh.sample_points_uniformly(count, use_triangle_normal=True).voxel_down_sample(VOXEL_M)
+        cloud = mesh.sample_points_uniformly(count, use_triangle_normal=True).voxel_down_sample(voxel_m)
         sides = np.asarray(cloud.normals).copy()
-        near = o3d.geometry.KDTreeSearchParamHybrid(2 * VOXEL_M, 30)
+        near = o3d.geometry.KDTreeSearchParamHybrid(2 * voxel_m, 30)
         cloud.estimate_normals(near)
         # To the side that the mesh shows.
         normals = np.asarray(cloud.normals)
         normals[np.einsum("ij,ij->i", normals, sides) < 0] *= -1
-        wide = o3d.geometry.KDTreeSearchParamHybrid(5 * VOXEL_M, 100)
-        return cloud, registration.compute_fpfh_feature(cloud, wide)
+        return cloud
 
-    (cloud_a, features_a), (cloud_b, features_b) = cloud_of(a), cloud_of(b)
+    cloud_a, cloud_b = (cloud_of(path, VOXEL_M) for path in (a, b))
+    wide = o3d.geometry.KDTreeSearchParamHybrid(5 * VOXEL_M, 100)
+    features_a, features_b = (registration.compute_fpfh_feature(cloud, wide) for cloud in (cloud_a, cloud_b))
     reach = 1.5 * VOXEL_M
     found = registration.registration_ransac_based_on_feature_matching(
         cloud_a, cloud_b, features_a, features_b, True, reach,
@@ -58,9 +60,10 @@ def with_open3d(a, b):
         registration.RANSACConvergenceCriteria(100_000, 0.999),
     )  # fmt: skip
     plane = registration.TransformationEstimationPointToPlane()
-    found = registration.registration_icp(cloud_a, cloud_b, VOXEL_M, found.transformation, plane)
-    found = registration.registration_icp(cloud_a, cloud_b, 0.4 * VOXEL_M, found.transformation, plane)
-    fitness = registration.evaluate_registration(cloud_a, cloud_b, VOXEL_M, found.transformation).fitness
+    cloud_a, cloud_b = (cloud_of(path, FINE_M) for path in (a, b))
+    for reach in (VOXEL_M, FINE_M, 0.4 * FINE_M):
+        found = registration.registration_icp(cloud_a, cloud_b, reach, found.transformation, plane)
+    fitness = registration.evaluate_registration(cloud_a, cloud_b, FINE_M, found.transformation).fitness
     print(np.asarray(found.transformation).tolist(), fitness, time.process_time() - before, sep="\n")
 
 
@@ -116,11 +119,11 @@ def judged(found, truth, middle, is_pair):
     return "near" if off <= 0.05 and angle <= 1 else "wrong"
 
 
-def main(s3d, folder):
-    """Compares both on all pairs of a folder."""
+def main(s3d, folder, every="1"):
+    """Compares both on each pair of a folder, or on every Nth."""
     counts, seconds = {}, {}
     with open(os.path.join(folder, "pairs.csv"), newline="") as file:
-        rows = list(csv.DictReader(file))
+        rows = list(csv.DictReader(file))[:: int(every)]
     for row in rows:
         a, b = (os.path.join(folder, f"{row['name']}_{part}.ply") for part in "ab")
         truth = np.array([[float(row[f"m{i}{j}"]) for j in range(4)] for i in range(3)])

@@ -145,11 +145,14 @@ fn least_axis(mut m: [[f64; 3]; 3]) -> ([f64; 3], DVec3) {
             let tangent = theta.signum() / (theta.abs() + (theta * theta + 1.0).sqrt());
             let cosine = 1.0 / (tangent * tangent + 1.0).sqrt();
             let sine = tangent * cosine;
-            for k in 0..3 {
-                (m[k][p], m[k][q]) = (cosine * m[k][p] - sine * m[k][q], sine * m[k][p] + cosine * m[k][q]);
+            let turned =
+                |first: f64, second: f64| (cosine * first - sine * second, sine * first + cosine * second);
+            for row in &mut m {
+                (row[p], row[q]) = turned(row[p], row[q]);
             }
-            for k in 0..3 {
-                (m[p][k], m[q][k]) = (cosine * m[p][k] - sine * m[q][k], sine * m[p][k] + cosine * m[q][k]);
+            let rows = [m[p], m[q]];
+            for (k, (first, second)) in rows[0].into_iter().zip(rows[1]).enumerate() {
+                (m[p][k], m[q][k]) = turned(first, second);
             }
             (axes[p], axes[q]) = (cosine * axes[p] - sine * axes[q], sine * axes[p] + cosine * axes[q]);
         }

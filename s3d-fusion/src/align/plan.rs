@@ -110,7 +110,7 @@ impl<'a> Plan<'a> {
             forward,
             inverse,
         };
-        let mut slabs = plan.images(plan.b.surface, plan.b.free, 0.0, DVec3::ZERO, low, count, false);
+        let mut slabs = plan.images(&plan.b, (DQuat::IDENTITY, DVec3::ZERO), low, count, false);
         slabs.iter_mut().flatten().for_each(|slab| {
             plan.saturate(&mut slab.walls, plan.pixel_m * plan.slab_m);
             plan.saturate(&mut slab.floors, plan.pixel_m * plan.pixel_m);
@@ -127,7 +127,7 @@ impl<'a> Plan<'a> {
         let low = DVec3::new(-self.reach_m, -self.reach_m, self.low.z);
         let lift = DVec3::new(0.0, 0.0, lift_m);
         let count = self.slabs.len();
-        let slabs = self.images(self.a.surface, self.a.free, turn_rad, lift, low, count, true);
+        let slabs = self.images(&self.a, (DQuat::from_rotation_z(turn_rad), lift), low, count, true);
 
         let [width, height] = self.size;
         let mut sum = vec![Complex32::ZERO; width * height];
@@ -193,18 +193,15 @@ impl<'a> Plan<'a> {
     }
 
     /// The images of a surface that is turned and shifted, with their lowest corner at `low`.
-    #[expect(clippy::too_many_arguments, reason = "TODO")]
     fn images(
         &self,
-        surface: &SurfacePoints,
-        free: &FreeSpace,
-        turn_rad: f64,
-        shift: DVec3,
+        shape: &Shape<'_>,
+        (turn, shift): (DQuat, DVec3),
         low: DVec3,
         count: usize,
         is_moving: bool,
     ) -> Vec<Option<Images>> {
-        let turn = DQuat::from_rotation_z(turn_rad);
+        let Shape { surface, free } = *shape;
         let mut slabs: Vec<Option<Images>> = vec![None; count];
         // Both surfaces count area, whatever the distance of their points.
         let area = ((surface.cell_m / 0.05) * (surface.cell_m / 0.05)) as f32;

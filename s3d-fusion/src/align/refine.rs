@@ -75,7 +75,7 @@ const WIDTH: f64 = 0.4;
 /// A motion of which less is along normals is left alone.
 const LEAST_SHARE: f64 = 0.003;
 /// A step below this, metres and radians, is the last.
-const LAST_STEP: f64 = 1e-6;
+const LAST_STEP: f64 = 1e-5;
 /// Fewer matches decide nothing.
 const LEAST_MATCHES: usize = 30;
 

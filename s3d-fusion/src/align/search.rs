@@ -53,7 +53,7 @@ const LEVELS: [Level; 3] = [
         reach_m: [0.06, 0.02],
         near_m: 0.02,
         steps: 25,
-        most_points: 40_000,
+        most_points: 12_000,
         places: 10,
         same_m: 0.03,
     },
@@ -72,6 +72,9 @@ const NEAR: f64 = 3.0;
 const NEAR_M: [f64; 2] = [0.006, 0.02];
 /// In the end, a surface this far beside another one is not the same, metres.
 const OFF_M: f64 = 0.28;
+/// The last steps, and the points that they take.
+const POLISH_STEPS: usize = 2;
+const MOST_POLISHED: usize = 40_000;
 /// So many points are looked at in the end.
 const MOST_SCORED: usize = 8_000;
 
@@ -162,7 +165,8 @@ impl<'a> Search<'a> {
             .par_iter()
             .filter_map(|(f, pair)| {
                 let unknown = unknown(self.options.is_level, self.options.with_scale);
-                let settled = pair.refined(f.place, unknown, [last.reach_m[1]; 2], 1, last.most_points)?;
+                let reach_m = [last.reach_m[1]; 2];
+                let settled = pair.refined(f.place, unknown, reach_m, POLISH_STEPS, MOST_POLISHED)?;
                 Some((*f, pair, settled))
             })
             .collect();
