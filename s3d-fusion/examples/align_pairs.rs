@@ -1,10 +1,10 @@
 //! Writes pairs of parts of buildings, for `bench/align_peers.py`: `align_pairs OUT [copyroom/rgb.obj]`. With
-//! two of these files, prints what `s3d align` prints of the transform: `align_pairs align A.ply B.ply`. So the
+//! two of these files, prints the transform as `s3d align` does: `align_pairs align A.ply B.ply`. So the
 //! library is measured without a build of the whole command.
 //!
 //! Parts are cut by upright planes in any direction, moved by up to 42 m and turned by any angle, and each
-//! vertex is off by 5 mm (one sigma and axis). Of each scene, eight pairs share 10 to 50 % of the second part,
-//! and two share nothing: another part of the same building, and a part of another one.
+//! vertex is off by 5 mm (one sigma and axis). Of each scene, eight pairs share 10 to 50 % of the second
+//! part, and two share nothing: another part of the same building, and a part of another one.
 #![allow(clippy::print_stdout)]
 
 use s3d_fusion::{AlignOptions, SurfacePoints, align};

@@ -17,7 +17,8 @@ use s3d_io::mesh::{LengthUnit, MeshOut, UpAxis, write_ply_mesh, write_textured_g
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// How two meshes or clouds are aligned. With the feature `clap` it is a group of arguments of a command line.
+/// How two meshes or clouds are aligned. With the feature `clap` it is a group of arguments of a command
+/// line.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "clap", derive(clap::Args))]
 pub struct AlignOptions {
@@ -59,8 +60,8 @@ pub struct AlignOptions {
 /// report says so, and nothing is written to [`AlignOptions::output`] unless one is chosen.
 ///
 /// # Errors
-/// [`Error::File`] and [`Error::Input`] for files that cannot be read, have too little surface, or do not fit.
-/// [`Error::Usage`] if the output exists and is not to be replaced, or `a` is a cloud and there is an output.
+/// [`Error::File`] and [`Error::Input`] for files that cannot be read, have too little surface, or do not
+/// fit. [`Error::Usage`] if the output exists and is not to be replaced, or `a` is a cloud and there is an output.
 /// [`Error::Cancelled`].
 pub fn align(a: &Path, b: &Path, options: &AlignOptions, ctx: &Context) -> Result<AlignReport> {
     if let Some(output) = &options.output {

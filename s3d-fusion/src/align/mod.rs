@@ -60,8 +60,8 @@ pub struct Alignment {
     pub against: [f64; 2],
     /// What speaks against the place, as a share of all that says something, 0 to 1; floors count less.
     pub contradiction: f64,
-    /// The evidence as a share of what lies on each other, up to 1. It is less if surfaces stand in room, or lie
-    /// beside each other by some centimetres.
+    /// The evidence as a share of what lies on each other, up to 1. It is less if surfaces stand in room, or
+    /// lie beside each other by some centimetres.
     pub agreement: f64,
     /// What speaks for the place less four times what speaks against it, square metres; floors count less.
     /// Places are ordered by it.
@@ -146,8 +146,8 @@ pub enum AlignError {
     NoHeights,
     /// No place fits.
     #[error(
-        "nothing fits: at the best place, {:.0} % of the smaller one lie on the other one, {:.0} % of what is \
-         seen of both contradicts, and the evidence is {:.0} % of what lies on each other",
+        "nothing fits: at the best place, {:.0} % of the smaller one lie on the other one, {:.0} % of what \
+         is seen of both contradicts, and the evidence is {:.0} % of what lies on each other",
         100.0 * .overlap,
         100.0 * .contradiction,
         100.0 * .agreement
