@@ -119,20 +119,20 @@ def judged(found, truth, middle, is_pair):
     return "near" if off <= 0.05 and angle <= 1 else "wrong"
 
 
-def main(s3d, folder, every="1"):
-    """Compares both on each pair of a folder; Open3D, which takes long, on every Nth if that is asked for."""
+def main(s3d, folder, scenes=""):
+    """Compares both on all pairs of a folder; Open3D, which takes long, on pairs of some scenes alone if they are named
+    (copyroom,two_storeys)."""
     counts, seconds = {}, {}
     with open(os.path.join(folder, "pairs.csv"), newline="") as file:
         rows = list(csv.DictReader(file))
-    # What both answer comes first.
-    numbered = sorted(enumerate(rows), key=lambda row: row[0] % int(every) > 0)
-    for number, row in numbered:
+    both = [row for row in rows if row["name"].startswith(tuple(scenes.split(",")))]
+    for row in both + [row for row in rows if row not in both]:
         a, b = (os.path.join(folder, f"{row['name']}_{part}.ply") for part in "ab")
         truth = np.array([[float(row[f"m{i}{j}"]) for j in range(4)] for i in range(3)])
         is_pair, middle = float(row["overlap"]) > 0, middle_of(a)
         line = f"{row['name']:16} overlap {float(row['overlap']):.2f}"
         answers = {"s3d": by_s3d(s3d, a, b)}
-        if number % int(every) == 0:
+        if row in both:
             answers["Open3D"] = by_open3d(a, b)
         for program, (found, spent) in answers.items():
             word = judged(found, truth, middle, is_pair)

@@ -48,6 +48,11 @@
 //! A grid can be limited to a [`Tile`]: a box of blocks. A caller goes over tiles, adds to each the images
 //! that see it, keeps its [`Surface`], and joins all of them. The mesh is the same as without tiles.
 //!
+//! # Two scans of one building
+//!
+//! [`align`] finds where one surface lies in the frame of another one, without a first guess, or says that it
+//! does not know.
+//!
 //! # How it works
 //!
 //! **Planes.** A plane is fitted to each pixel by its neighbours on the same surface. The distance of a voxel
