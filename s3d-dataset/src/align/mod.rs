@@ -61,8 +61,8 @@ pub struct AlignOptions {
 ///
 /// # Errors
 /// [`Error::File`] and [`Error::Input`] for files that cannot be read, have too little surface, or do not
-/// fit. [`Error::Usage`] if the output exists and is not to be replaced, or `a` is a cloud and there is an output.
-/// [`Error::Cancelled`].
+/// fit. [`Error::Usage`] if the output exists and is not to be replaced, or `a` is a cloud and there is an
+/// output. [`Error::Cancelled`].
 pub fn align(a: &Path, b: &Path, options: &AlignOptions, ctx: &Context) -> Result<AlignReport> {
     if let Some(output) = &options.output {
         if !has_ending(output, "ply") && !has_ending(output, "glb") {
