@@ -1,6 +1,6 @@
 //! The command line as a whole.
 
-use crate::commands::meshes::{fuse, render, sample, segments};
+use crate::commands::meshes::{align, fuse, render, sample, segments};
 use crate::commands::scores::{detect, eval};
 use crate::commands::shards::{merge, plan};
 use crate::commands::{additions, compare, demo, export, info, label, pack, report, stats, verify};
@@ -88,6 +88,10 @@ pub(crate) enum Command {
         )
     )]
     Fuse(fuse::FuseArgs),
+    /// Find where a mesh or cloud lies in the frame of another one of the same building.
+    #[command(after_help = "Example:\n  s3d align kitchen.ply house.glb -o moved.glb\nExit code 1: nothing \
+        fits, or several answers do. The page \"Alignment\" of the documentation has the rest.")]
+    Align(align::AlignArgs),
     /// Label scenes and score their views ahead of an export that many machines share.
     #[command(
         after_help = concat!(
@@ -275,6 +279,7 @@ impl Command {
             | Self::Profile(_)
             | Self::Report(_)
             | Self::Figures(_)
+            | Self::Align(_)
             | Self::Label(_)
             | Self::Compare(_)
             | Self::Eval(_)
@@ -289,6 +294,7 @@ impl Command {
             Self::Demo(args) => demo::run(args),
             Self::Export(args) => export::run(args),
             Self::Fuse(args) => fuse::run(args),
+            Self::Align(args) => align::run(args),
             Self::Plan(args) => plan::run(args),
             Self::Merge(args) => merge::run(args),
             Self::Sample(args) => sample::run(args),

@@ -3,6 +3,7 @@
 
 mod common;
 
+mod align;
 mod areas;
 mod bad_input;
 mod bad_names;

@@ -127,6 +127,7 @@
 #![cfg_attr(not(test), deny(clippy::unwrap_used, clippy::panic, clippy::string_slice))]
 
 mod account;
+pub mod align;
 mod bare;
 pub mod compare;
 mod condition;
@@ -158,6 +159,7 @@ mod useful;
 pub mod verify;
 pub mod xyz;
 
+pub use align::{AlignOptions, AlignReport, align};
 pub use bare::{BarePanorama, BarePhotograph, BareScene};
 pub use compare::compare;
 pub use context::{Cancel, Context, Observer, Progress};

@@ -48,6 +48,11 @@
 //! A grid can be limited to a [`Tile`]: a box of blocks. A caller goes over tiles, adds to each the images
 //! that see it, keeps its [`Surface`], and joins all of them. The mesh is the same as without tiles.
 //!
+//! # Two scans of one building
+//!
+//! [`align`] finds where one surface lies in the frame of another one, without a first guess, or says that it
+//! does not know.
+//!
 //! # How it works
 //!
 //! **Planes.** A plane is fitted to each pixel by its neighbours on the same surface. The distance of a voxel
@@ -81,6 +86,7 @@
     deny(clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::unreachable, clippy::string_slice)
 )]
 
+mod align;
 mod close;
 mod columns;
 mod decimate;
@@ -94,6 +100,7 @@ mod origin;
 mod range_image;
 mod register;
 
+pub use align::{AlignError, AlignOptions, Aligned, Alignment, Doubt, SurfacePoints, align};
 pub use close::{CloseError, CloseOptions, ClosedHoles, OpenLoops, close_holes};
 pub use columns::{ColumnsError, MeshColumns};
 pub use decimate::{DecimateError, DecimateOptions, Decimated, decimate, decimate_while};

@@ -20,7 +20,7 @@ use tempfile::TempDir;
 
 /// The commands, called in a folder with `scan` (the input), `out` (an export) and `shard_1`, `shard_2` (its
 /// shards). A new command that writes needs a line here.
-const COMMANDS: [&str; 50] = [
+const COMMANDS: [&str; 51] = [
     "export scan/scene.toml -o new SMALL",
     "export scan/scene.toml -o out SMALL --seed 7 --overwrite",
     "export scan/scene.toml -o new SMALL --profile pointcept,open3d-ml",
@@ -57,6 +57,7 @@ const COMMANDS: [&str; 50] = [
     "fuse scan/points.xyz -o new --origin 2,1.5,1.25 --cell 0.03",
     "fuse scan/points.xyz -o old.ply --origin 2,1.5,1.25 --cell 0.03 --overwrite",
     "fuse scan/points.xyz -o new.ply --origin 2,1.5,1.25 --cell 0.03 --memory 0.002",
+    "align scan/room.obj scan/room.obj -o old.ply --nth 1 --overwrite",
     "label scan/room.obj -o labels --write ply",
     "label scan/room.obj -o labels --write scannet --to new",
     "render scan/room.obj --at 2,1.2,1.5 --size 200 -o new",

@@ -170,7 +170,7 @@ fn vote_findings(report: &VoteReport) -> Vec<Finding> {
     if far > 0.05 {
         let text = format!(
             "{} of the annotated points are farther than 5 cm from every face: do mesh and annotations share \
-             a frame? see `up` in the scene file",
+             a frame? see `up` in the scene file, or let `s3d align` find where one lies in the other",
             percent(far)
         );
         findings.push(Finding::new(Condition::Frame, far > 0.5, text));

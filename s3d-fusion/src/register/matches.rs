@@ -47,6 +47,7 @@ impl<'a> Scans<'a> {
             along_m,
             across_m: 1.5 * self.options.cell_m,
             cosine: libm::cos(self.options.max_angle_rad),
+            is_two_sided: false,
         };
         let points = (0..).zip(self.points[a].positions.iter().zip(&self.points[a].normals));
         let every = self.points[a].positions.len().div_ceil(self.options.most_points.max(1));

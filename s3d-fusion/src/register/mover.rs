@@ -2,7 +2,7 @@
 
 use super::RegisterOptions;
 use super::matches::{Match, Scans};
-use super::system::{Arm, Open, System};
+use super::system::{Arm, Open, RIGID, System};
 use rayon::prelude::*;
 use s3d_geom::glam::{DAffine3, DMat3, DQuat, DVec3};
 
@@ -137,7 +137,7 @@ impl<'a> Mover<'a> {
             .zip(self.scans.points)
             .map(|(pose, p)| pose.transform_point3(p.middle()))
             .collect();
-        let mut system = System::new(self.moving.len());
+        let mut system = System::new(self.moving.len(), RIGID);
         for (&[a, b], (matches, distances)) in links.iter().zip(&found) {
             let (points, partners) = (&self.scans.points[a], &self.scans.points[b]);
             for (m, &distance) in matches.iter().zip(distances) {
@@ -151,7 +151,7 @@ impl<'a> Mover<'a> {
 
         let (step, open) = system.solve(self.options.least_share);
         self.open = open;
-        for (&scan, motion) in self.moving.iter().zip(step.chunks_exact(6)) {
+        for (&scan, motion) in self.moving.iter().zip(step.chunks_exact(RIGID.len())) {
             let [translation, rotation] = [0, 3].map(|i| DVec3::new(motion[i], motion[i + 1], motion[i + 2]));
             let turn = DMat3::from_quat(DQuat::from_scaled_axis(rotation));
             let pose = &self.poses[scan];
@@ -168,12 +168,18 @@ impl<'a> Mover<'a> {
     pub(super) fn told(&self, open: &Open) -> OpenMotion {
         let largest = open.motion.iter().fold(0.0, |largest: f64, m| largest.max(m.abs()));
         let scaled: Vec<f64> = open.motion.iter().map(|m| m / largest.max(f64::MIN_POSITIVE)).collect();
-        let motions = self.moving.iter().zip(scaled.chunks_exact(6)).filter_map(|(&scan, m)| {
-            let motion =
-                Motion { translation: DVec3::new(m[0], m[1], m[2]), rotation: DVec3::new(m[3], m[4], m[5]) };
-            let moves = motion.translation.length().max(motion.rotation.length()) > 0.05;
-            moves.then_some((scan, motion))
-        });
+        let motions = self
+            .moving
+            .iter()
+            .zip(scaled.chunks_exact(RIGID.len()))
+            .filter_map(|(&scan, m)| {
+                let motion = Motion {
+                    translation: DVec3::new(m[0], m[1], m[2]),
+                    rotation: DVec3::new(m[3], m[4], m[5]),
+                };
+                let moves = motion.translation.length().max(motion.rotation.length()) > 0.05;
+                moves.then_some((scan, motion))
+            });
         OpenMotion { share: open.share, motions: motions.collect() }
     }
 }

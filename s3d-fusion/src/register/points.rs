@@ -56,7 +56,7 @@ fn cell(p: Vec3, cell_m: f64) -> [i32; 3] {
 }
 
 /// Finds points that are near, by cubes.
-pub(super) struct Grid<'a> {
+pub(crate) struct Grid<'a> {
     points: &'a ScanPoints,
     cell_m: f64,
     /// The cube of each point, ascending, with the point.
@@ -65,17 +65,19 @@ pub(super) struct Grid<'a> {
 
 /// How far a point may be from its partner.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Reach {
+pub(crate) struct Reach {
     /// Along the normal, metres.
-    pub(super) along_m: f64,
+    pub(crate) along_m: f64,
     /// Across the normal, metres.
-    pub(super) across_m: f64,
+    pub(crate) across_m: f64,
     /// The least cosine between the normals.
-    pub(super) cosine: f64,
+    pub(crate) cosine: f64,
+    /// Whether a normal and its opposite are the same.
+    pub(crate) is_two_sided: bool,
 }
 
 impl<'a> Grid<'a> {
-    pub(super) fn new(points: &'a ScanPoints, cell_m: f64) -> Self {
+    pub(crate) fn new(points: &'a ScanPoints, cell_m: f64) -> Self {
         let all = (0..).zip(&points.positions);
         let mut cells: Vec<([i32; 3], u32)> = all.map(|(i, p)| (cell(*p, cell_m), i)).collect();
         cells.sort_unstable();
@@ -84,7 +86,7 @@ impl<'a> Grid<'a> {
 
     /// The nearest point within reach whose normal fits; the smaller number wins a tie. The reach must not
     /// exceed the edge of the cubes.
-    pub(super) fn nearest(&self, p: DVec3, normal: DVec3, reach: &Reach) -> Option<u32> {
+    pub(crate) fn nearest(&self, p: DVec3, normal: DVec3, reach: &Reach) -> Option<u32> {
         let [x, y, z] = cell(p.as_vec3(), self.cell_m);
         let mut best = (f64::INFINITY, None);
         for x in x.saturating_sub(1)..=x.saturating_add(1) {
@@ -96,10 +98,12 @@ impl<'a> Grid<'a> {
                     let n = self.points.normals[i as usize].as_dvec3();
                     let (between, squared) = (p - q, p.distance_squared(q));
                     let along = n.dot(between);
+                    let cosine = n.dot(normal);
+                    let cosine = if reach.is_two_sided { cosine.abs() } else { cosine };
                     let fits = squared < best.0
                         && along.abs() <= reach.along_m
                         && squared - along * along <= reach.across_m * reach.across_m
-                        && n.dot(normal) >= reach.cosine;
+                        && cosine >= reach.cosine;
                     if fits {
                         best = (squared, Some(i));
                     }

@@ -1,13 +1,17 @@
 //! The normal equations of small motions of scans, and what they leave open.
 //!
-//! A motion of a scan has six numbers: a translation, and a rotation about the middle of the scan. A pair of
-//! points p and q, with the normal n at q, has the residual n · (p − q).
+//! A motion of a scan has seven numbers: a translation, a rotation about the middle of the scan, and how much
+//! the scan grows about it. A system is told which of them are unknown ([`RIGID`]). A pair of points p and q,
+//! with the normal n at q, has the residual n · (p − q).
 //!
 //! Sources: Y. Chen and G. Medioni, "Object modelling by registration of multiple range images", 1992 (point
 //! to plane); J. Zhang, M. Kaess and S. Singh, "On degeneracy of optimization-based state estimation
 //! problems", 2016 (steps only where the equations decide).
 
 use s3d_geom::glam::DVec3;
+
+/// All motions that keep lengths, among the seven numbers: three of the translation, three of the rotation.
+pub(crate) const RIGID: &[usize] = &[0, 1, 2, 3, 4, 5];
 
 /// A square matrix, symmetric, by rows.
 #[derive(Clone, Debug)]
@@ -31,7 +35,9 @@ impl Matrix {
 }
 
 /// The equations for the scans that may move.
-pub(super) struct System {
+pub(crate) struct System {
+    /// Which of the seven numbers of a motion are unknown.
+    unknown: &'static [usize],
     /// The sums of weighted squares of the motions along the normals.
     along: Matrix,
     /// The sums of weighted squares of the motions between the two points of each pair.
@@ -41,52 +47,53 @@ pub(super) struct System {
 
 /// How one point of a pair moves with its scan.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Arm {
+pub(crate) struct Arm {
     /// The place of the scan among those that may move; `None` if it stays.
-    pub(super) place: Option<usize>,
+    pub(crate) place: Option<usize>,
     /// From the middle of the scan to the point, metres.
-    pub(super) arm: DVec3,
+    pub(crate) arm: DVec3,
 }
 
-/// A direction that the equations do not decide, as six numbers for each scan that may move.
-pub(super) struct Open {
+/// A direction that the equations do not decide: the unknown numbers of each scan that may move.
+pub(crate) struct Open {
     /// The mean squared share of the motion along the normals, 0 to 1.
-    pub(super) share: f64,
-    pub(super) motion: Vec<f64>,
+    pub(crate) share: f64,
+    pub(crate) motion: Vec<f64>,
 }
 
 impl System {
-    /// The equations of so many scans that may move.
-    pub(super) fn new(scans: usize) -> Self {
-        let size = 6 * scans;
-        Self { along: Matrix::zero(size), total: Matrix::zero(size), right: vec![0.0; size] }
+    /// The equations of so many scans that may move by the `unknown` ones of the seven numbers.
+    pub(crate) fn new(scans: usize, unknown: &'static [usize]) -> Self {
+        let size = unknown.len() * scans;
+        Self { unknown, along: Matrix::zero(size), total: Matrix::zero(size), right: vec![0.0; size] }
     }
 
     /// Adds a pair of points. The first one moves with `arms[0]`, the second one and its normal with
     /// `arms[1]`.
-    pub(super) fn add(&mut self, arms: [Arm; 2], normal: DVec3, residual: f64, weight: f64) {
+    pub(crate) fn add(&mut self, arms: [Arm; 2], normal: DVec3, residual: f64, weight: f64) {
         let signs = [1.0, -1.0];
         // The motion of a point, one row per axis, and its part along the normal.
         let rows = arms.map(|Arm { arm, .. }| {
             let axes = [DVec3::X, DVec3::Y, DVec3::Z, normal];
             axes.map(|axis| {
                 let turn = arm.cross(axis);
-                [axis.x, axis.y, axis.z, turn.x, turn.y, turn.z]
+                [axis.x, axis.y, axis.z, turn.x, turn.y, turn.z, arm.dot(axis)]
             })
         });
+        let count = self.unknown.len();
 
         for i in 0..2 {
             let Some(first) = arms[i].place else { continue };
-            let right = &mut self.right[6 * first..6 * first + 6];
-            for (sum, part) in right.iter_mut().zip(rows[i][3]) {
-                *sum -= weight * signs[i] * part * residual;
+            let right = &mut self.right[count * first..count * (first + 1)];
+            for (sum, &a) in right.iter_mut().zip(self.unknown) {
+                *sum -= weight * signs[i] * rows[i][3][a] * residual;
             }
             for j in 0..2 {
                 let Some(second) = arms[j].place else { continue };
                 let factor = weight * signs[i] * signs[j];
-                for a in 0..6 {
-                    for b in 0..6 {
-                        let (row, column) = (6 * first + a, 6 * second + b);
+                for (at, &a) in self.unknown.iter().enumerate() {
+                    for (to, &b) in self.unknown.iter().enumerate() {
+                        let (row, column) = (count * first + at, count * second + to);
                         *self.along.at_mut(row, column) += factor * rows[i][3][a] * rows[j][3][b];
                         let total = (0..3).map(|axis| rows[i][axis][a] * rows[j][axis][b]).sum::<f64>();
                         *self.total.at_mut(row, column) += factor * total;
@@ -98,7 +105,7 @@ impl System {
 
     /// The step with the least residuals, and the directions in which it does nothing, since less than
     /// `least_share` of their motion is along normals.
-    pub(super) fn solve(&self, least_share: f64) -> (Vec<f64>, Vec<Open>) {
+    pub(crate) fn solve(&self, least_share: f64) -> (Vec<f64>, Vec<Open>) {
         let size = self.right.len();
         let mut step = vec![0.0; size];
         let Some(lower) = cholesky(&self.total) else {

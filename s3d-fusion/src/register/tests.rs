@@ -188,7 +188,7 @@ fn rooms_without_an_overlap_stay() {
 #[test]
 fn the_grid_finds_what_measuring_all_points_finds() {
     let points = corridor(4);
-    let reach = Reach { along_m: 0.2, across_m: 0.15, cosine: 0.9 };
+    let reach = Reach { along_m: 0.2, across_m: 0.15, cosine: 0.9, is_two_sided: false };
     let grid = Grid::new(&points, 0.25);
     for i in 0..300 {
         let p = dvec3(3.2 * noise(i), 1.2 * noise(i + 1000), 1.25 + 1.5 * noise(i + 2000));

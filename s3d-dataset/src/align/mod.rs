@@ -1,0 +1,161 @@
+//! The transform from one mesh or cloud to another that shows some of the same building.
+
+mod read;
+mod report;
+
+pub use report::AlignReport;
+
+use crate::context::Context;
+use crate::error::{Error, Result, UsageError};
+use crate::mesh_axes::MeshAxes;
+use crate::store::NewFile;
+use glam::{DAffine3, DVec3, Vec3};
+use read::{Read, has_ending, read};
+use s3d_fusion::{AlignError, AlignOptions as SearchOptions, Aligned, align as search};
+use s3d_geom::TriMesh;
+use s3d_io::mesh::{LengthUnit, MeshOut, UpAxis, write_ply_mesh, write_textured_glb};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// How two meshes or clouds are aligned. With the feature `clap` it is a group of arguments of a command
+/// line.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
+pub struct AlignOptions {
+    /// Turn the first one about all axes, instead of the upright one alone.
+    #[cfg_attr(feature = "clap", arg(long))]
+    pub tilted: bool,
+    /// Find the scale of the first one too, by heights of rooms.
+    #[cfg_attr(feature = "clap", arg(long))]
+    pub scale: bool,
+    /// Take the Nth of several answers.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "N"))]
+    pub nth: Option<usize>,
+    /// The axis of the first one that points up [default: y in glTF, guessed in other meshes, z in clouds]
+    #[cfg_attr(feature = "clap", arg(long, value_name = "y|z",
+        value_parser = crate::options::words::parsed::<UpAxis>))]
+    pub up_a: Option<UpAxis>,
+    /// The axis of the second one that points up.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "y|z",
+        value_parser = crate::options::words::parsed::<UpAxis>))]
+    pub up_b: Option<UpAxis>,
+    /// The unit of the first one [default: metres in glTF and clouds; in other meshes what the file says, or
+    /// else guessed from the height of rooms]
+    #[cfg_attr(feature = "clap", arg(long, value_name = "m|cm|mm|ft|in",
+        value_parser = crate::options::words::parsed::<LengthUnit>))]
+    pub units_a: Option<LengthUnit>,
+    /// The unit of the second one.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "m|cm|mm|ft|in",
+        value_parser = crate::options::words::parsed::<LengthUnit>))]
+    pub units_b: Option<LengthUnit>,
+    /// Write the first one, a mesh, into the frame of the second: .ply, or .glb with textures.
+    #[cfg_attr(feature = "clap", arg(short, long, value_name = "moved.glb"))]
+    pub output: Option<PathBuf>,
+    /// Replace the file if it exists.
+    #[cfg_attr(feature = "clap", arg(long, requires = "output"))]
+    pub overwrite: bool,
+}
+
+/// Finds where the mesh or cloud in the file `a` lies in the frame of `b`. If there are several answers, the
+/// report says so, and nothing is written to [`AlignOptions::output`] unless one is chosen.
+///
+/// # Errors
+/// [`Error::File`] and [`Error::Input`] for files that cannot be read, have too little surface, or do not
+/// fit. [`Error::Usage`] if the output exists and is not to be replaced, or `a` is a cloud and there is an
+/// output. [`Error::Cancelled`].
+pub fn align(a: &Path, b: &Path, options: &AlignOptions, ctx: &Context) -> Result<AlignReport> {
+    if let Some(output) = &options.output {
+        if !has_ending(output, "ply") && !has_ending(output, "glb") {
+            let why = "a mesh is written as PLY or GLB: give it a name that ends with .ply or .glb";
+            return Err(UsageError::WrongEnding { path: output.clone(), why }.into());
+        }
+        NewFile::check_free(output, options.overwrite)?;
+    }
+
+    let [of_a, of_b] = [
+        MeshAxes { up: options.up_a, units: options.units_a },
+        MeshAxes { up: options.up_b, units: options.units_b },
+    ];
+    let [read_a, read_b] = [read(a, of_a, ctx)?, read(b, of_b, ctx)?];
+    if let (Some(output), None) = (&options.output, &read_a.mesh) {
+        let why = "the first one is a cloud, and only meshes are written: move it by the transform";
+        return Err(UsageError::WrongEnding { path: output.clone(), why }.into());
+    }
+
+    let started = Instant::now();
+    let aligned = found(a, b, &read_a, &read_b, options)?;
+    ctx.check()?;
+    ctx.info(format_args!(
+        "{:.0} and {:.0} m² compared in {:.1} s",
+        read_a.points.area_m2(),
+        read_b.points.area_m2(),
+        started.elapsed().as_secs_f64()
+    ));
+    let report = AlignReport::new(aligned, options.nth);
+    let Some(place) = report.place() else {
+        let why = format!("there are {} answers", report.aligned.places.len());
+        return Err(Error::unfit(a, why));
+    };
+
+    if let (Some(output), Some(mesh), None) = (&options.output, read_a.mesh, &report.doubt) {
+        // Positions are `f32`, so the offset of a far frame stays subtracted.
+        let near = DAffine3::from_translation(-read_b.offset_m)
+            * place.b_from_a
+            * DAffine3::from_translation(read_a.offset_m);
+        write(&moved(mesh, &near)?, output, read_b.offset_m, options.overwrite, ctx)?;
+    }
+    Ok(report)
+}
+
+/// The places in the frames of the files.
+fn found(a: &Path, b: &Path, of_a: &Read, of_b: &Read, options: &AlignOptions) -> Result<Aligned> {
+    let how = SearchOptions { is_level: !options.tilted, with_scale: options.scale };
+    let mut aligned = search(&of_a.points, &of_b.points, &how).map_err(|error| {
+        let with = b.display();
+        match error {
+            AlignError::Units { .. } => {
+                Error::unfit(a, format!("beside {with}, {error} (`units_a` and `units_b` say them)"))
+            }
+            _ => Error::unfit(a, format!("with {with}: {error}")),
+        }
+    })?;
+    for place in &mut aligned.places {
+        place.b_from_a = DAffine3::from_translation(of_b.offset_m)
+            * place.b_from_a
+            * DAffine3::from_translation(-of_a.offset_m);
+    }
+    Ok(aligned)
+}
+
+/// A mesh after a motion. Normals of corners turn along.
+fn moved(mesh: TriMesh, motion: &DAffine3) -> Result<TriMesh> {
+    let mut parts = mesh.into_parts();
+    for p in &mut parts.positions {
+        *p = motion.transform_point3(p.as_dvec3()).as_vec3();
+    }
+    for n in &mut parts.normals {
+        *n = (motion.matrix3 * n.as_dvec3()).normalize_or_zero().as_vec3();
+    }
+    TriMesh::new(parts).map_err(|error| Error::unfit("the moved mesh", error.to_string()))
+}
+
+fn write(mesh: &TriMesh, path: &Path, offset_m: DVec3, overwrite: bool, ctx: &Context) -> Result<()> {
+    let mut comments = Vec::new();
+    if offset_m != DVec3::ZERO {
+        let [x, y, z] = offset_m.to_array();
+        comments.push(format!("offset {x} {y} {z} was subtracted"));
+        ctx.info(format_args!("{}: {:?} is subtracted", path.display(), offset_m.to_array()));
+    }
+    let file = NewFile::begin(ctx, path, overwrite)?;
+    if has_ending(path, "glb") {
+        write_textured_glb(file.path(), mesh)?;
+    } else {
+        let positions: &[Vec3] = mesh.positions();
+        let colors = &mesh.parts().colors;
+        let colors: &[[u8; 3]] = if colors.len() == positions.len() { colors } else { &[] };
+        let out =
+            MeshOut { positions, faces: mesh.faces(), colors, comments: &comments, ..MeshOut::default() };
+        write_ply_mesh(file.path(), &out)?;
+    }
+    file.finish()
+}

@@ -1,0 +1,195 @@
+//! The surface of a mesh or a cloud, whatever its file is.
+
+use crate::context::Context;
+use crate::error::{Error, Result};
+use crate::mesh_axes::{MeshAxes, read_mesh};
+use glam::{DAffine3, DMat3, DVec3, Vec3};
+use s3d_fusion::SurfacePoints;
+use s3d_geom::{PointCloud, TriMesh};
+use s3d_io::cloud::{AnnotationOptions, Annotations, InstanceReader};
+use s3d_io::mesh::{LengthUnit, MeshFormat, MeshOrigin, UpAxis};
+use s3d_io::raw::{RawOptions, RawScan};
+use std::collections::HashMap;
+use std::path::Path;
+
+/// The edge of the cubes that clouds are thinned by while they are read, metres.
+const CELL_M: f64 = 0.02;
+/// If so many cubes are full, they are made wider.
+const MOST_CELLS: usize = 4_000_000;
+/// The number of annotated points that are read at a time.
+const BLOCK: usize = 1 << 16;
+
+/// A surface that was read.
+pub(super) struct Read {
+    pub(super) points: SurfacePoints,
+    /// Subtracted from the coordinates of the file, world axes, metres.
+    pub(super) offset_m: DVec3,
+    /// `None` for a cloud.
+    pub(super) mesh: Option<TriMesh>,
+}
+
+/// Reads a mesh, a laser scan, or annotated points.
+pub(super) fn read(path: &Path, axes: MeshAxes, ctx: &Context) -> Result<Read> {
+    let thin = |error: s3d_fusion::AlignError| Error::unfit(path, error.to_string());
+    let is_annotated = path.is_dir() || has_ending(path, "mat");
+    let is_points = !is_annotated && RawScan::form_of(path)?.is_some();
+    if !is_annotated && !is_points && MeshFormat::of(path).is_some() {
+        let file = read_mesh(path, axes, MeshOrigin::Near, ctx)?;
+        let points = SurfacePoints::of_mesh(&file.mesh).map_err(thin)?;
+        return Ok(Read { points, offset_m: file.offset_m, mesh: Some(file.mesh) });
+    }
+
+    let turn = axes.up.map_or(DMat3::IDENTITY, UpAxis::rotation);
+    let world_from_file = DAffine3::from_mat3(turn * axes.units.map_or(1.0, LengthUnit::metres));
+    let mut thinned = Thinned::default();
+    match is_points || !is_annotated {
+        true => read_scans(path, world_from_file, &mut thinned, ctx)?,
+        false => read_annotated(path, world_from_file, &mut thinned, ctx)?,
+    }
+    let (offset_m, positions, sides) = thinned.columns();
+    let points = SurfacePoints::of_points(&positions, &sides).map_err(thin)?;
+    Ok(Read { points, offset_m, mesh: None })
+}
+
+pub(super) fn has_ending(path: &Path, ending: &str) -> bool {
+    path.extension().is_some_and(|found| found.eq_ignore_ascii_case(ending))
+}
+
+fn read_scans(path: &Path, world_from_file: DAffine3, to: &mut Thinned, ctx: &Context) -> Result<()> {
+    let options = RawOptions { world_from_file, ..RawOptions::default() };
+    let RawScan::Scans(scans) = RawScan::open(path, &options)? else {
+        let why = "depth pictures are fused to a mesh first: `s3d fuse`";
+        return Err(Error::unfit(path, why));
+    };
+    ctx.warn_each(&scans.warnings);
+    for (number, scan) in scans.scans().iter().enumerate() {
+        let read = scans.read(number, |block| {
+            ctx.check()?;
+            for (i, p) in block.positions_m.iter().enumerate() {
+                let origin = block.origins_m.get(i).copied().or(scan.origin_m);
+                to.add(*p, origin.map(|origin| origin - *p));
+            }
+            Ok::<(), Error>(())
+        })?;
+        ctx.warn_each(&read.warnings);
+    }
+    Ok(())
+}
+
+fn read_annotated(path: &Path, world_from_file: DAffine3, to: &mut Thinned, ctx: &Context) -> Result<()> {
+    let area = Annotations::open(&[path.to_owned()], &AnnotationOptions::default())?;
+    ctx.warn_each(&area.warnings);
+    let mut reader = InstanceReader::new(BLOCK);
+    for instance in area.rooms.iter().flat_map(|room| &room.instances) {
+        reader.read(instance, None, |block: &PointCloud, _| {
+            ctx.check()?;
+            for p in &block.positions {
+                to.add(world_from_file.transform_point3(p.as_dvec3()), None);
+            }
+            Ok::<(), Error>(())
+        })?;
+    }
+    Ok(())
+}
+
+/// Points of a cloud of any size, thinned by cubes.
+#[derive(Default)]
+struct Thinned {
+    /// A whole number of metres near the first point.
+    offset_m: Option<DVec3>,
+    /// The edge of the cubes is this power of two times [`CELL_M`].
+    doublings: i32,
+    cells: HashMap<[i32; 3], Cell>,
+    has_unseen: bool,
+}
+
+/// The sums of the points of a cube.
+#[derive(Clone, Copy, Default)]
+struct Cell {
+    position: DVec3,
+    /// Directions towards the scanner.
+    side: Vec3,
+    count: f64,
+}
+
+impl Thinned {
+    /// Adds a point in the world, with the way to the scanner if that is known.
+    fn add(&mut self, p: DVec3, side: Option<DVec3>) {
+        if !p.is_finite() {
+            return;
+        }
+        let offset = *self.offset_m.get_or_insert((p / 100.0).round() * 100.0);
+        self.has_unseen |= side.is_none();
+        let p = p - offset;
+        let point = Cell {
+            position: p,
+            side: side.map_or(Vec3::ZERO, |side| side.normalize_or_zero().as_vec3()),
+            count: 1.0,
+        };
+        self.cells.entry(self.cube(p)).or_default().join(&point);
+        if self.cells.len() > MOST_CELLS {
+            self.widen();
+        }
+    }
+
+    fn cube(&self, p: DVec3) -> [i32; 3] {
+        (p / (CELL_M * f64::from(1u32 << self.doublings.min(31))))
+            .floor()
+            .as_ivec3()
+            .to_array()
+    }
+
+    /// Joins cubes by eight.
+    fn widen(&mut self) {
+        self.doublings += 1;
+        let mut old: Vec<([i32; 3], Cell)> = self.cells.drain().collect();
+        // The order of sums must not depend on the table.
+        old.sort_unstable_by_key(|(cube, _)| *cube);
+        for (cube, cell) in old {
+            self.cells.entry(cube.map(|i| i.div_euclid(2))).or_default().join(&cell);
+        }
+    }
+
+    /// The offset that was subtracted, the positions, and the ways to the scanner if all are known.
+    fn columns(self) -> (DVec3, Vec<Vec3>, Vec<Vec3>) {
+        let mut cells: Vec<([i32; 3], Cell)> = self.cells.into_iter().collect();
+        cells.sort_unstable_by_key(|(cube, _)| *cube);
+        let positions = cells
+            .iter()
+            .map(|(_, cell)| (cell.position / cell.count).as_vec3())
+            .collect();
+        let sides = match self.has_unseen {
+            true => Vec::new(),
+            false => cells.iter().map(|(_, cell)| cell.side.normalize_or(Vec3::Z)).collect(),
+        };
+        (self.offset_m.unwrap_or_default(), positions, sides)
+    }
+}
+
+impl Cell {
+    fn join(&mut self, other: &Self) {
+        self.position += other.position;
+        self.side += other.side;
+        self.count += other.count;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn clouds_are_thinned_far_from_the_origin() {
+        let mut thinned = Thinned::default();
+        let at = DVec3::new(500_000.25, 5_400_000.5, 300.0);
+        for i in 0..1000 {
+            thinned.add(at + DVec3::new(0.001 * f64::from(i), 0.0, 0.0), None);
+        }
+        thinned.add(DVec3::NAN, None);
+        thinned.widen();
+        let (offset, positions, sides) = thinned.columns();
+        assert_eq!(offset, DVec3::new(500_000.0, 5_400_000.0, 300.0));
+        assert!((24..=27).contains(&positions.len()) && sides.is_empty(), "{}", positions.len());
+        assert!(positions.iter().all(|p| (p.y - 0.5).abs() < 1e-6 && p.z == 0.0));
+    }
+}
