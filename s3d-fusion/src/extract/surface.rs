@@ -26,17 +26,22 @@ impl Surface {
         let mut places: Vec<Place> = grid.places.iter().copied().filter(holds).collect();
         places.par_sort_unstable_by_key(|[_, _, z]| *z);
 
-        // Layer by layer, so that little is held twice beside the grid.
-        let mut whole = Self { cell_m, vertices: Vec::new(), faces: Vec::new() };
-        let mut last_layer = 0..0;
-        for layer in places.chunk_by(|a, b| a[2] == b[2]) {
+        // Layer by layer, so that little is held twice beside the grid. One is made while another is joined.
+        let layers: Vec<&[Place]> = places.chunk_by(|a, b| a[2] == b[2]).collect();
+        let parts_of = |layer: &[Place]| -> Vec<Part> {
             let parts = layer
                 .par_iter()
-                .map(|place| Samples::of(grid, *place, (cell_m / front_m) as f32).part(cell_m))
-                .filter(|part| !part.faces.is_empty())
-                .collect();
+                .map(|place| Samples::of(grid, *place, (cell_m / front_m) as f32).part(cell_m));
+            parts.filter(|part| !part.faces.is_empty()).collect()
+        };
+        let mut whole = Self { cell_m, vertices: Vec::new(), faces: Vec::new() };
+        let mut last_layer = 0..0;
+        let mut parts = layers.first().map_or_else(Vec::new, |layer| parts_of(layer));
+        for (number, layer) in layers.iter().enumerate() {
             let start = whole.faces.len();
-            whole.append(Self::of_parts(cell_m, parts), last_layer, layer[0][2]);
+            let join = || whole.append(Self::of_parts(cell_m, parts), last_layer, layer[0][2]);
+            let next = || layers.get(number + 1).map_or_else(Vec::new, |layer| parts_of(layer));
+            (_, parts) = rayon::join(join, next);
             last_layer = start..whole.faces.len();
         }
         whole

@@ -49,9 +49,7 @@ impl Adding<'_> {
             return Ok(());
         }
         let bounds = self.bounds(&view, low, high)?;
-        for block in touched {
-            grid.block_at(place_of(block));
-        }
+        grid.make_blocks(touched.into_iter().map(place_of));
 
         // Chunks between the sensor and what it saw.
         let pyramid = Pyramid::new(&surfels, view.size);

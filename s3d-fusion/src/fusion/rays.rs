@@ -70,9 +70,7 @@ impl AddingRays<'_> {
             let mut found = found.collect::<Vec<_>>().concat();
             found.par_sort_unstable();
             found.dedup();
-            found.into_iter().for_each(|block| {
-                grid.block_at(place_of(block));
-            });
+            grid.make_blocks(found.into_iter().map(place_of));
         }
         for batch in rays.chunks(BATCH) {
             let shots: Vec<Shot> = batch.par_iter().map(|i| self.shot(*i, &normals)).collect();

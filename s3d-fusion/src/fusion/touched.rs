@@ -38,7 +38,7 @@ impl Adding<'_> {
         let low = bands.iter().fold(Vec3::ZERO, |low, band| low.min(band.low));
         let high = bands.iter().fold(Vec3::ZERO, |high, band| high.max(band.high));
         let mut blocks: Vec<u64> = bands.into_iter().flat_map(|band| band.blocks).collect();
-        blocks.sort_unstable();
+        blocks.par_sort_unstable();
         blocks.dedup();
         Touched { blocks, low, high }
     }

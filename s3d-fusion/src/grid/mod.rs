@@ -6,6 +6,7 @@
 pub(crate) mod block;
 
 use block::Block;
+use rayon::prelude::*;
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
 
@@ -59,16 +60,18 @@ impl Grid {
         self.index.get(&key(place)).and_then(|i| self.chunks.get(*i as usize))
     }
 
-    /// Returns the index of a block, which is made if it does not exist.
-    pub(crate) fn block_at(&mut self, place: Place) -> usize {
-        let chunk = self.chunk_at(chunk_of(place));
-        let slot = &mut self.chunks[chunk].blocks[slot_of(place)];
-        if *slot == NONE {
-            *slot = self.blocks.len() as u32;
-            self.blocks.push(Box::default());
-            self.places.push(place);
+    /// Makes the blocks that do not exist yet. Their memory is cleared on all threads.
+    pub(crate) fn make_blocks(&mut self, places: impl Iterator<Item = Place>) {
+        for place in places {
+            let chunk = self.chunk_at(chunk_of(place));
+            let slot = &mut self.chunks[chunk].blocks[slot_of(place)];
+            if *slot == NONE {
+                *slot = self.places.len() as u32;
+                self.places.push(place);
+            }
         }
-        *slot as usize
+        let new = self.blocks.len()..self.places.len();
+        self.blocks.par_extend(new.into_par_iter().map(|_| Box::default()));
     }
 
     /// Returns the index of a block, if it exists.
@@ -94,7 +97,7 @@ impl Grid {
     pub(crate) fn bytes(&self) -> u64 {
         let blocks: usize = self
             .blocks
-            .iter()
+            .par_iter()
             .map(|b| b.bytes() + size_of::<(Box<Block>, Place)>())
             .sum();
         let chunks = self.chunks.len() * (size_of::<Chunk>() + size_of::<(u64, u32)>());
