@@ -17,12 +17,8 @@ use s3d_dataset::{PairsOptions, RefineOptions};
     version,
     max_term_width = 110,
     after_help = concat!(
-        "Start with the built-in scene:\n",
-        "  s3d demo\n",
-        "then a scan of your own:\n",
-        "  s3d info scan/scene.toml\n",
-        "  s3d export scan/scene.toml -o dataset\n",
-        "\n",
+        "Start with the built-in scene:\n  s3d demo\n",
+        "then a scan of your own:\n  s3d info scan/scene.toml\n  s3d export scan/scene.toml -o dataset\n\n",
         "Exit codes: 0 done, 1 the input or the disk, 2 the call, 75 stopped by a signal or a full disk: ",
         "call it again.",
     )

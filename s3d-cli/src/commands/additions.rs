@@ -44,14 +44,12 @@ pub(crate) struct ProfileArgs {
     #[arg(long = "to", required = true, value_delimiter = ',', value_parser = parsed::<Profile>,
         value_name = "pointcept|open3d-ml|mmdet3d|pointnet")]
     pub(crate) profiles: Vec<Profile>,
-    /// Replace what is in OUT/profiles/NAME.
-    #[arg(long)]
-    pub(crate) overwrite: bool,
+    #[command(flatten)]
+    pub(crate) options: ProfileOptions,
 }
 
 pub(crate) fn profile(args: ProfileArgs) -> Outcome<()> {
-    let options = ProfileOptions { overwrite: args.overwrite };
     on_threads(Threads { threads: None }, |context| {
-        s3d_dataset::profile(args.output, &args.profiles, &options, context)
+        s3d_dataset::profile(args.output, &args.profiles, &args.options, context)
     })
 }

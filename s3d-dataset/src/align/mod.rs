@@ -14,6 +14,7 @@ use read::{Read, has_ending, read};
 use s3d_fusion::{AlignError, AlignOptions as SearchOptions, Aligned, align as search};
 use s3d_geom::TriMesh;
 use s3d_io::mesh::{LengthUnit, MeshOut, UpAxis, write_ply_mesh, write_textured_glb};
+use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -28,9 +29,9 @@ pub struct AlignOptions {
     /// Find the scale of the first one too, by heights of rooms.
     #[cfg_attr(feature = "clap", arg(long))]
     pub scale: bool,
-    /// Take the Nth of several answers.
+    /// Take the Nth of several answers, from 1.
     #[cfg_attr(feature = "clap", arg(long, value_name = "N"))]
-    pub nth: Option<usize>,
+    pub nth: Option<NonZeroUsize>,
     /// The axis of the first one that points up [default: y in glTF, guessed in other meshes, z in clouds]
     #[cfg_attr(feature = "clap", arg(long, value_name = "y|z",
         value_parser = crate::options::words::parsed::<UpAxis>))]

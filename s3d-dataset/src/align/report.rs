@@ -3,6 +3,7 @@
 use glam::{DAffine3, DVec3};
 use s3d_fusion::{Aligned, Alignment, Doubt};
 use std::fmt::Write;
+use std::num::NonZeroUsize;
 
 /// Where a mesh or cloud lies in the frame of another one.
 #[derive(Clone, Debug, PartialEq)]
@@ -18,17 +19,17 @@ pub struct AlignReport {
 }
 
 impl AlignReport {
-    pub(super) fn new(aligned: Aligned, nth: Option<usize>) -> Self {
+    pub(super) fn new(aligned: Aligned, nth: Option<NonZeroUsize>) -> Self {
         let doubt = aligned
             .doubt()
             .filter(|_| nth.is_none())
             .map(|doubt| sentence(&aligned, doubt));
-        Self { aligned, nth: nth.unwrap_or(1), doubt }
+        Self { aligned, nth: nth.map_or(1, NonZeroUsize::get), doubt }
     }
 
     /// Returns the place that was chosen.
     pub fn place(&self) -> Option<&Alignment> {
-        self.aligned.places.get(self.nth.saturating_sub(1))
+        self.nth.checked_sub(1).and_then(|at| self.aligned.places.get(at))
     }
 
     /// Returns the report as TOML: `transform` is written as scene files take it.

@@ -33,8 +33,10 @@ const AREAS_OF_LOADERS: std::ops::RangeInclusive<u32> = 1..=6;
 
 /// How profiles are written into a data set.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
 pub struct ProfileOptions {
-    /// Replace existing profiles.
+    /// Replace what is in OUT/profiles/NAME.
+    #[cfg_attr(feature = "clap", arg(long))]
     pub overwrite: bool,
 }
 

@@ -82,6 +82,25 @@ fn parts_of_buildings_are_found() {
     assert_found(&a, &b, &AlignOptions::default(), &pose.inverse());
 }
 
+/// A box-like room fits both ways but for its furniture, and parts of it show some of that each.
+#[test]
+fn parts_of_a_room_are_never_turned_around() {
+    for seed in [1, 3, 5, 9] {
+        let room = s3d_synth::scenes::furnished_room(seed);
+        let bounds = room.aabb();
+        let at = |share: f32| bounds.min + (bounds.max - bounds.min) * share;
+        let pose = somewhere(seed as f64);
+        let a = surface(&room, &pose, 1, |p| p.x < at(0.8).x);
+        let b = surface(&room, &DAffine3::IDENTITY, 2, |p| p.x > at(0.2).x);
+        let aligned = align(&a, &b, &AlignOptions::default()).unwrap();
+        let is_right = |place: &Alignment| {
+            let (distance_m, angle_deg) = error(&a, place, &pose.inverse());
+            distance_m < 0.005 && angle_deg < 0.05
+        };
+        assert!(aligned.doubt().is_some() || is_right(&aligned.places[0]), "{seed}: {aligned:?}");
+    }
+}
+
 #[test]
 fn clouds_without_sides_are_found() {
     let house = built(Building::two_storeys());
