@@ -42,9 +42,14 @@ pub(super) fn read(path: &Path, axes: MeshAxes, ctx: &Context) -> Result<Read> {
     let turn = axes.up.map_or(DMat3::IDENTITY, UpAxis::rotation);
     let world_from_file = DAffine3::from_mat3(turn * axes.units.map_or(1.0, LengthUnit::metres));
     let mut thinned = Thinned::default();
-    match is_points || !is_annotated {
-        true => read_scans(path, world_from_file, &mut thinned, ctx)?,
-        false => read_annotated(path, world_from_file, &mut thinned, ctx)?,
+    if is_annotated {
+        read_annotated(path, world_from_file, &mut thinned, ctx)?;
+    } else if is_points || !path.exists() {
+        read_scans(path, world_from_file, &mut thinned, ctx)?;
+    } else {
+        let why = "is no mesh (OBJ, glTF, GLB, PLY), no laser scan (E57, PTX, LAS, LAZ, PLY, PCD, text), and \
+                   no annotated points (a folder, or pointcloud.mat)";
+        return Err(Error::unfit(path, why));
     }
     let (offset_m, positions, sides) = thinned.columns();
     let points = SurfacePoints::of_points(&positions, &sides).map_err(thin)?;
@@ -158,9 +163,10 @@ impl Thinned {
             .iter()
             .map(|(_, cell)| (cell.position / cell.count).as_vec3())
             .collect();
-        let sides = match self.has_unseen {
-            true => Vec::new(),
-            false => cells.iter().map(|(_, cell)| cell.side.normalize_or(Vec3::Z)).collect(),
+        let sides = if self.has_unseen {
+            Vec::new()
+        } else {
+            cells.iter().map(|(_, cell)| cell.side.normalize_or(Vec3::Z)).collect()
         };
         (self.offset_m.unwrap_or_default(), positions, sides)
     }

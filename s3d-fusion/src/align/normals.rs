@@ -1,5 +1,6 @@
 //! Planes through the points around a place.
 
+use crate::register::cell;
 use rayon::prelude::*;
 use s3d_geom::glam::{DVec3, Vec3};
 
@@ -30,7 +31,7 @@ impl<'a> Neighbours<'a> {
     /// `positions` are finite. `sides` is empty, or has one unit vector a point.
     pub(super) fn new(positions: &'a [Vec3], sides: &'a [Vec3], radius_m: f64) -> Self {
         let all = positions.par_iter().enumerate();
-        let mut cubes: Vec<([i32; 3], u32)> = all.map(|(i, p)| (cube(*p, radius_m), i as u32)).collect();
+        let mut cubes: Vec<([i32; 3], u32)> = all.map(|(i, p)| (cell(*p, radius_m), i as u32)).collect();
         cubes.par_sort_unstable();
         Self { positions, sides, radius_m, cubes }
     }
@@ -80,9 +81,9 @@ impl<'a> Neighbours<'a> {
         Some((place, if turned { -normal } else { normal }))
     }
 
-    /// The points within the radius, relative to nothing, in a fixed order.
+    /// The points within the radius that look to the same side, in a fixed order.
     fn within(&self, p: DVec3, side: Option<DVec3>) -> Vec<DVec3> {
-        let [x, y, z] = cube(p.as_vec3(), self.radius_m);
+        let [x, y, z] = cell(p.as_vec3(), self.radius_m);
         let mut near = Vec::new();
         for x in x.saturating_sub(1)..=x.saturating_add(1) {
             for y in y.saturating_sub(1)..=y.saturating_add(1) {
@@ -101,11 +102,6 @@ impl<'a> Neighbours<'a> {
         }
         near
     }
-}
-
-/// The cube that a point lies in.
-pub(super) fn cube(p: Vec3, edge_m: f64) -> [i32; 3] {
-    (p.as_dvec3() / edge_m).floor().as_ivec3().to_array()
 }
 
 /// The middle of weighted points, the direction in which they spread least, and their three spreads (mean

@@ -89,7 +89,7 @@ impl<'a> Plan<'a> {
         let slab_m = SLAB_M.max((high.z - low.z) / MOST_SLABS);
         let low = low - DVec3::new(0.0, 0.0, slab_m);
 
-        let pixels = |edge_m: f64| even_size(((edge_m + 2.0 * reach_m) / pixel_m) as usize + 4);
+        let pixels = |edge_m: f64| smooth_size(((edge_m + 2.0 * reach_m) / pixel_m) as usize + 4);
         let size = [pixels(high.x - low.x), pixels(high.y - low.y)];
         let mut planner = FftPlannerScalar::new();
         let forward = size.map(|n| planner.plan_fft_forward(n));
@@ -210,14 +210,17 @@ impl<'a> Plan<'a> {
             let is_level = n.z.abs() >= LEVEL;
             for (slab, i, part) in self.pixels(turn * p.as_dvec3() + shift, low, &mut slabs) {
                 let weight = part * area;
-                match is_level {
-                    true => slab.floors[i].re += weight * if self.are_two_sided { 1.0 } else { n.z.signum() },
-                    false => slab.walls[i] += self.direction(n) * weight,
-                }
-                let counted = weight * if is_level { FLOOR_WEIGHT } else { 1.0 };
-                match is_moving {
-                    true => slab.room[i].re += counted,
-                    false => slab.room[i].im += counted,
+                let counted = if is_level {
+                    slab.floors[i].re += weight * if self.are_two_sided { 1.0 } else { n.z.signum() };
+                    weight * FLOOR_WEIGHT
+                } else {
+                    slab.walls[i] += self.direction(n) * weight;
+                    weight
+                };
+                if is_moving {
+                    slab.room[i].re += counted;
+                } else {
+                    slab.room[i].im += counted;
                 }
             }
         }
@@ -232,9 +235,10 @@ impl<'a> Plan<'a> {
                     let place = turn * DVec3::new(f64::from(x), f64::from(y), z) + shift;
                     for (slab, i, part) in self.pixels(place, low, &mut slabs) {
                         let room = part * covered * (step / self.slab_m) as f32;
-                        match is_moving {
-                            true => slab.room[i].im += room,
-                            false => slab.room[i].re += room,
+                        if is_moving {
+                            slab.room[i].im += room;
+                        } else {
+                            slab.room[i].re += room;
                         }
                     }
                 }
@@ -256,9 +260,11 @@ impl<'a> Plan<'a> {
         let (x, y) = (at.x.max(0.0) as usize, at.y.max(0.0) as usize);
         let slab = (at.z - 0.5).floor();
         let part = (at.z - 0.5 - slab) as f32;
-        let (first, last) = match inside && slab >= 0.0 && slab + 1.0 < slabs.len() as f64 {
-            true => (slab as usize, slab as usize + 2),
-            false => (0, 0),
+        let is_inside = inside && slab >= 0.0 && slab + 1.0 < slabs.len() as f64;
+        let (first, last) = if is_inside {
+            (slab as usize, slab as usize + 2)
+        } else {
+            (0, 0)
         };
         let shares = [1.0 - part, part];
         slabs[first..last].iter_mut().zip(shares).map(move |(slab, share)| {
@@ -271,9 +277,10 @@ impl<'a> Plan<'a> {
     /// Where a wall looks, as a number whose product with that of another wall is 1 if they agree.
     fn direction(&self, n: Vec3) -> Complex32 {
         let direction = Complex32::new(n.x, n.y);
-        match self.are_two_sided {
-            true => direction * direction / n.truncate().length().max(1e-6),
-            false => direction,
+        if self.are_two_sided {
+            direction * direction / n.truncate().length().max(1e-6)
+        } else {
+            direction
         }
     }
 
@@ -325,7 +332,7 @@ fn transpose(image: &mut [Complex32], width: usize, height: usize) {
 }
 
 /// The least number from `least` on whose factors are 2, 3 and 5.
-fn even_size(least: usize) -> usize {
+fn smooth_size(least: usize) -> usize {
     (least.max(8)..)
         .find(|n| {
             let mut rest = *n;

@@ -116,9 +116,10 @@ pub(super) struct Search<'a> {
 
 impl<'a> Search<'a> {
     pub(super) fn new(a: &'a SurfacePoints, b: &'a SurfacePoints, options: &'a AlignOptions) -> Self {
-        let (tilts_a, of_b) = match options.is_level {
-            true => (vec![DQuat::IDENTITY], DQuat::IDENTITY),
-            false => (tilts(a), tilts(b).first().copied().unwrap_or(DQuat::IDENTITY)),
+        let (tilts_a, of_b) = if options.is_level {
+            (vec![DQuat::IDENTITY], DQuat::IDENTITY)
+        } else {
+            (tilts(a), tilts(b).first().copied().unwrap_or(DQuat::IDENTITY))
         };
         let turned_b = b.turned(of_b, 1.0);
         let view = |turn: DQuat, scale: f64| {
@@ -127,9 +128,10 @@ impl<'a> Search<'a> {
             View { free: FreeSpace::new(&turned.points, turned.has_sides), a: turned, of_a }
         };
         let views = tilts_a.iter().flat_map(|turn| {
-            let scales = match options.with_scale {
-                true => scales(&a.turned(*turn, 1.0), &turned_b),
-                false => vec![1.0],
+            let scales = if options.with_scale {
+                scales(&a.turned(*turn, 1.0), &turned_b)
+            } else {
+                vec![1.0]
             };
             scales
                 .into_iter()

@@ -1,8 +1,8 @@
 //! A surface as points with normals, evenly spread.
 
 use super::AlignError;
-use super::normals::{Neighbours, cube};
-use crate::register::ScanPoints;
+use super::normals::Neighbours;
+use crate::register::{ScanPoints, cell};
 use rayon::prelude::*;
 use s3d_geom::glam::{DQuat, DVec3, Vec3};
 use s3d_geom::{Density, PointCloud, SurfaceSampler, TriMesh};
@@ -65,9 +65,10 @@ impl SurfacePoints {
             .iter()
             .map(|i| (positions[*i].as_dvec3() - middle).as_vec3())
             .collect();
-        let sides: Vec<Vec3> = match has_sides {
-            true => kept.iter().map(|i| sides[*i].normalize_or(Vec3::Z)).collect(),
-            false => Vec::new(),
+        let sides: Vec<Vec3> = if has_sides {
+            kept.iter().map(|i| sides[*i].normalize_or(Vec3::Z)).collect()
+        } else {
+            Vec::new()
         };
 
         let cell_m = wide_enough(&near);
@@ -89,10 +90,10 @@ impl SurfacePoints {
             points.positions.push(place.as_vec3());
             points.normals.push(normal.as_vec3().normalize());
         }
-        match points.positions.len() < LEAST_POINTS {
-            true => Err(AlignError::Thin { points: kept.len(), surface: points.positions.len() }),
-            false => Ok(Self { points, middle, cell_m, has_sides }),
+        if points.positions.len() < LEAST_POINTS {
+            return Err(AlignError::Thin { points: kept.len(), surface: points.positions.len() });
         }
+        Ok(Self { points, middle, cell_m, has_sides })
     }
 
     /// The area that was found, square metres.
@@ -131,7 +132,7 @@ impl SurfacePoints {
 /// The edge of cubes that leaves neither too many nor too few points of a cloud.
 fn wide_enough(positions: &[Vec3]) -> f64 {
     let filled = |cell_m: f64| {
-        let mut cubes: Vec<[i32; 3]> = positions.par_iter().map(|p| cube(*p, cell_m)).collect();
+        let mut cubes: Vec<[i32; 3]> = positions.par_iter().map(|p| cell(*p, cell_m)).collect();
         cubes.par_sort_unstable();
         cubes.dedup();
         cubes.len() as f64
@@ -154,7 +155,7 @@ fn wide_enough(positions: &[Vec3]) -> f64 {
 /// Thins points to the mean of each cube; those of a cube that look to different sides stay apart.
 fn thinned(positions: &[Vec3], sides: &[Vec3], cell_m: f64) -> (Vec<Vec3>, Vec<Vec3>) {
     let all = positions.par_iter().enumerate();
-    let mut keys: Vec<([i32; 3], u32)> = all.map(|(i, p)| (cube(*p, cell_m), i as u32)).collect();
+    let mut keys: Vec<([i32; 3], u32)> = all.map(|(i, p)| (cell(*p, cell_m), i as u32)).collect();
     keys.par_sort_unstable();
     let (mut places, mut place_sides) = (Vec::new(), Vec::new());
     for group in keys.chunk_by(|a, b| a.0 == b.0) {

@@ -64,10 +64,8 @@ pub(super) fn turns(a: &SurfacePoints, b: &SurfacePoints) -> Vec<f64> {
             .take(QUARTERED)
             .map(|turn| (turn + f64::from(quarter) * TAU / 4.0) % TAU);
         for turn in more {
-            if turns.iter().all(|other| {
-                (turn - other + 0.5 * TAU).rem_euclid(TAU) - 0.5 * TAU > SAME_RAD
-                    || (turn - other + 0.5 * TAU).rem_euclid(TAU) - 0.5 * TAU < -SAME_RAD
-            }) {
+            let between = |other: f64| (turn - other + 0.5 * TAU).rem_euclid(TAU) - 0.5 * TAU;
+            if turns.iter().all(|other| between(*other).abs() > SAME_RAD) {
                 turns.push(turn);
             }
         }

@@ -20,7 +20,7 @@ pub use pairs::{PairResidual, pair_residuals};
 pub use points::ScanPoints;
 pub use refine::{RefinedPoses, refine_poses};
 
-pub(crate) use points::{Grid, Reach};
+pub(crate) use points::{Grid, Reach, cell};
 pub(crate) use system::{Arm, Open, System};
 
 use s3d_geom::glam::{DAffine3, DMat3};

@@ -51,7 +51,7 @@ impl ScanPoints {
 }
 
 /// The cube that a point lies in.
-fn cell(p: Vec3, cell_m: f64) -> [i32; 3] {
+pub(crate) fn cell(p: Vec3, cell_m: f64) -> [i32; 3] {
     (p.as_dvec3() / cell_m).floor().as_ivec3().to_array()
 }
 

@@ -6,7 +6,8 @@
 //!
 //! | kind | samples | of a data set |
 //! |---|---|---|
-//! | [`encode_rgb8`] | 3 × 8 bits | `rgb`, `normal`, `semantic`, `semantic_pretty`, `principal_curvature`, `semantic_refined` |
+//! | [`encode_rgb8`] | 3 × 8 bits | `rgb`, `normal`, `semantic_pretty`, `principal_curvature` |
+//! | [`encode_rgb8`] | 3 × 8 bits, indices of labels | `semantic`, `semantic_refined` |
 //! | [`encode_palette8`] | 8 bits and a palette | `semantic_class` |
 //! | [`encode_gray16`] | 16 bits | `depth`, `depth_euclidean`, `boundary_distance` |
 //! | [`encode_numbers16`] | 16 bits, numbers of patches | `segment_unsup2d`, `segment_unsup25d` |

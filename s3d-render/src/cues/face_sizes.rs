@@ -27,8 +27,8 @@ pub fn face_size_image_into(scene: &Scene<'_>, hits: &Hits, camera: &Camera, out
         focal.x * focal.y
     };
 
-    // A face of this area A at the depth z takes A · d / z³ of the image at z = 1, where d is the distance of
-    // its plane from the eye.
+    // A face of this area A at the depth z takes A · d / z³ of the image at z = 1, where d is the distance
+    // of its plane from the eye.
     let mut scale_of_face = FaceCache::new();
     let mut last = (NO_FACE, 0.0);
     let pixels = hits.face.pixels().iter().zip(hits.depth.pixels());

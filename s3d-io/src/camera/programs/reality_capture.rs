@@ -4,9 +4,9 @@
 //! ArthurBrussee/brush (crates/brush-dataset), and RealityCapture's support, "XMP Camera Math".
 //!
 //! Angles are degrees: a camera in OpenGL's axes is turned by roll about y, by pitch about x, and by
-//! −heading about z. `f` is the focal length for a picture whose longer side is 36; `px` and `py` are the distance of
-//! the principal point from the middle, as shares of the longer side. The unit of the distortion is not
-//! documented, so lenses that distort are refused.
+//! −heading about z. `f` is the focal length for a picture whose longer side is 36; `px` and `py` are the
+//! distance of the principal point from the middle, as shares of the longer side. The unit of the distortion
+//! is not documented, so lenses that distort are refused.
 
 use crate::camera::picture::read_picture_size;
 use crate::camera::posed::{Distortion, Optics, PosedCamera};
