@@ -15,7 +15,7 @@ use s3d_geom::glam::{DVec2, DVec3, dvec2, dvec3};
 use s3d_geom::{Camera, Pose, Raster, TriMesh};
 use s3d_io::image::{Compression, Content, write_rgb8};
 use s3d_label::LabelId;
-use s3d_render::{MipMaps, Scene, TextureFilter, cast_ray, rgb_of_ray};
+use s3d_render::{Hit, MipMaps, Scene, TextureFilter, cast_rays, rgb_of_ray};
 use std::path::Path;
 
 /// The size of the picture, in pixels.
@@ -23,6 +23,7 @@ const SIZE: [u32; 2] = [1600, 1000];
 
 /// Rays along each side of a pixel.
 const SAMPLES: u32 = 2;
+const RAYS_A_PIXEL: usize = (SAMPLES * SAMPLES) as usize;
 
 /// The horizontal angle of view, degrees.
 const FOV_DEG: f64 = 38.0;
@@ -39,9 +40,6 @@ const LINE_PX: u32 = 3;
 /// weights of red, green and blue in it.
 const DETAIL: f32 = 0.35;
 const LUMA: [f32; 3] = [0.2126, 0.7152, 0.0722];
-
-/// The most faces that are seen from behind along a ray.
-const MOST_BACKS: u32 = 64;
 
 /// Draws a picture of the data set in the folder `out`, and writes it to `to`, a PNG of 1600 × 1000 pixels,
 /// whole or not at all. It shows the mesh of the first area obliquely from above, with the storey of most
@@ -200,11 +198,13 @@ pub(crate) fn picture(
         Colors::Halves(classes) => (Some(classes), width / 2),
     };
 
-    let color = |x: u32, y: u32| -> [f32; 3] {
-        let direction = rays.at(x, y);
-        let Some(face) = first_front(&scene, camera.pose.location, direction, section) else { return ground };
+    let fronts = Fronts::new(mesh, camera.pose.location);
+    let shown = fronts.as_ref().map(|fronts| (Scene::new(&fronts.mesh), &fronts.faces));
+
+    let color = |x: u32, face: Option<u32>, direction: DVec3| -> [f32; 3] {
+        let Some(face) = face else { return ground };
         let seen = rgb_of_ray(&scene, &textures, &camera, direction, face, &filter).map(f32::from);
-        let Some(classes) = classes.filter(|_| x / SAMPLES >= from) else { return seen };
+        let Some(classes) = classes.filter(|_| x >= from) else { return seen };
 
         let class = classes.get(face as usize).copied().unwrap_or_else(unlabelled);
         let facing = mesh.normal(face).as_dvec3().dot(direction.normalize()).abs() as f32;
@@ -215,40 +215,83 @@ pub(crate) fn picture(
             .sum::<f32>();
         class.map(|channel| (1.0 - DETAIL) * f32::from(channel) * (0.6 + 0.4 * facing) + DETAIL * gray)
     };
-    let pixel = |x: u32, y: u32| -> [u8; 3] {
-        if matches!(colors, Colors::Halves(_)) && x.abs_diff(from) <= LINE_PX / 2 {
-            return LINE.map(|channel| channel as u8);
-        }
-        let mut sum = [0.0; 3];
-        for sample in 0..SAMPLES * SAMPLES {
-            let seen = color(x * SAMPLES + sample % SAMPLES, y * SAMPLES + sample / SAMPLES);
-            sum.iter_mut().zip(seen).for_each(|(sum, channel)| *sum += channel);
-        }
-        sum.map(|channel| (channel / (SAMPLES * SAMPLES) as f32).round() as u8)
+    let row = |y: u32| -> Vec<[u8; 3]> {
+        // The rays of a pixel follow each other.
+        let samples = (0..width).flat_map(|x| (0..SAMPLES * SAMPLES).map(move |sample| (x, sample)));
+        let directions: Vec<DVec3> = samples
+            .map(|(x, sample)| rays.at(x * SAMPLES + sample % SAMPLES, y * SAMPLES + sample / SAMPLES))
+            .collect();
+        let faces = match &shown {
+            Some((scene, faces)) => first_faces(scene, faces, camera.pose.location, &directions, section),
+            None => vec![None; directions.len()],
+        };
+
+        let of_pixels = directions.chunks(RAYS_A_PIXEL).zip(faces.chunks(RAYS_A_PIXEL)).zip(0..);
+        let pixel = |((directions, faces), x): ((&[DVec3], &[Option<u32>]), u32)| {
+            if matches!(colors, Colors::Halves(_)) && x.abs_diff(from) <= LINE_PX / 2 {
+                return LINE.map(|channel| channel as u8);
+            }
+            let mut sum = [0.0; 3];
+            for (direction, face) in directions.iter().zip(faces) {
+                let seen = color(x, *face, *direction);
+                sum.iter_mut().zip(seen).for_each(|(sum, channel)| *sum += channel);
+            }
+            sum.map(|channel| (channel / RAYS_A_PIXEL as f32).round() as u8)
+        };
+        of_pixels.map(pixel).collect()
     };
 
-    let rows: Vec<Vec<[u8; 3]>> = (0..height)
-        .into_par_iter()
-        .map(|y| (0..width).map(|x| pixel(x, y)).collect())
-        .collect();
+    let rows: Vec<Vec<[u8; 3]>> = (0..height).into_par_iter().map(row).collect();
     Raster::from_vec(width, height, rows.concat())
 }
 
-/// Returns the first face along a ray whose front is seen, below the height `section`.
-fn first_front(scene: &Scene<'_>, eye: DVec3, direction: DVec3, section: f64) -> Option<u32> {
-    let above = eye.z - section;
-    if above > 0.0 && direction.z >= 0.0 {
-        return None;
+/// The faces of a mesh whose fronts are seen from a place.
+struct Fronts {
+    mesh: TriMesh,
+    /// For each of its faces the face of the whole mesh.
+    faces: Vec<u32>,
+}
+
+impl Fronts {
+    /// Returns `None` if all faces show their backs.
+    fn new(mesh: &TriMesh, eye: DVec3) -> Option<Self> {
+        let is_front = |face: &u32| {
+            let to_face = mesh.triangle(*face)[0].as_dvec3() - eye;
+            mesh.normal(*face).as_dvec3().dot(to_face) < 0.0
+        };
+        let all = 0..mesh.faces().len() as u32;
+        let faces: Vec<u32> = all.into_par_iter().filter(is_front).collect();
+        let corners = faces.iter().map(|face| mesh.faces()[*face as usize]).collect();
+        let mesh = TriMesh::from_faces(mesh.positions().to_vec(), corners).ok()?;
+        Some(Self { mesh, faces })
     }
-    let mut origin = eye + direction * (above / -direction.z).max(0.0);
-    for _ in 0..MOST_BACKS {
-        let hit = cast_ray(scene, origin, direction)?;
-        if scene.mesh().normal(hit.face).as_dvec3().dot(direction) < 0.0 {
-            return Some(hit.face);
+}
+
+/// Returns the first face along each ray from `eye`, below the height `section`. `faces` are the names of the
+/// scene's faces.
+fn first_faces(
+    scene: &Scene<'_>,
+    faces: &[u32],
+    eye: DVec3,
+    directions: &[DVec3],
+    section: f64,
+) -> Vec<Option<u32>> {
+    let above = (eye.z - section).max(0.0);
+    let origin = |direction: &DVec3| {
+        if above > 0.0 && direction.z < 0.0 {
+            eye + *direction * (above / -direction.z)
+        } else {
+            eye
         }
-        origin += direction * (hit.t * (1.0 + 1e-9) + 1e-6);
-    }
-    None
+    };
+    let origins: Vec<DVec3> = directions.iter().map(origin).collect();
+    let hits = cast_rays(scene, &origins, directions);
+    let face = |(hit, direction): (Option<Hit>, &DVec3)| {
+        // A ray that does not go down stays above the section.
+        let is_below = above == 0.0 || direction.z < 0.0;
+        hit.filter(|_| is_below).map(|hit| faces[hit.face as usize])
+    };
+    hits.into_iter().zip(directions).map(face).collect()
 }
 
 #[cfg(test)]
@@ -285,11 +328,21 @@ mod tests {
     #[test]
     fn ceilings_are_cut_away_and_backs_seen_through() {
         let house = slabs(&[(0.0, true), (1.0, false), (2.5, false)]);
-        let scene = Scene::new(&house);
         let eye = dvec3(2.2, 1.9, 9.0);
+        let fronts = Fronts::new(&house, eye).unwrap();
+        let scene = Scene::new(&fronts.mesh);
+        let along = [DVec3::NEG_Z, DVec3::Z];
         // The table at 1 m has no front here.
-        assert!(matches!(first_front(&scene, eye, DVec3::NEG_Z, 2.4), Some(0 | 1)));
-        assert_eq!(first_front(&scene, eye, DVec3::Z, 2.4), None);
+        let found = first_faces(&scene, &fronts.faces, eye, &along, 2.4);
+        assert!(matches!(found[..], [Some(0 | 1), None]), "{found:?}");
+        // From below it has, and the ceiling too.
+        let low = dvec3(2.2, 1.9, 0.5);
+        let fronts = Fronts::new(&house, low).unwrap();
+        let scene = Scene::new(&fronts.mesh);
+        let found = first_faces(&scene, &fronts.faces, low, &along, 2.4);
+        assert!(matches!(found[..], [Some(0 | 1), Some(2 | 3)]), "{found:?}");
+        assert!(Fronts::new(&slabs(&[(2.5, false)]), eye).is_none());
+
         let picture = picture(&house, Colors::Halves(&[[200, 0, 0]; 6]), 2.4, SIZE, GROUND);
         let right = picture.at(SIZE[0] * 5 / 8, SIZE[1] / 2);
         assert!(right[0] > right[1] + 80 && right[1] == right[2], "{right:?}");
