@@ -84,6 +84,7 @@ fn add_texts(glb: &mut Glb, texts: &[String]) -> Value {
 
 #[cfg(test)]
 mod tests {
+    use crate::cloud::{AnnotationOptions, Annotations};
     use crate::mesh::{MeshLabels, UpAxis, read_mesh, write_labelled_glb};
     use s3d_geom::glam::{Vec2, Vec3};
     use s3d_geom::{FaceColor, Material, MeshParts, NO_INDEX, Raster, Texture, TriMesh, Wrap};
@@ -131,9 +132,14 @@ mod tests {
                 Some(object) => {
                     let expected = table.get(s3d_label::LabelId(label)).unwrap();
                     assert_eq!(object.class, expected.class.to_string());
+                    let room = object.room.as_ref().and_then(|room| room.name.clone());
+                    assert_eq!(room, Some(expected.room.to_string()));
                 }
             }
         }
+        let annotations = Annotations::of_mesh(&read, &AnnotationOptions::default()).unwrap();
+        let rooms: Vec<String> = annotations.rooms.iter().map(|room| room.room.to_string()).collect();
+        assert_eq!(rooms, ["hallway_1", "office_5", "office_6"]);
         assert!(matches!(read.mesh.color_of(0), FaceColor::Texture(..)));
         assert!(matches!(read.mesh.color_of(3), FaceColor::Flat([9, 130, 255])));
     }

@@ -4,7 +4,7 @@
 use crate::mesh::gltf::document::GltfDocument;
 use crate::mesh::gltf::features::FeatureObjects;
 use crate::mesh::gltf::words::NodeWords;
-use crate::mesh::labels::{LabelledObject, MeshLabels};
+use crate::mesh::labels::{LabelledObject, LabelledRoom, MeshLabels};
 use s3d_geom::NO_INDEX;
 use std::collections::HashMap;
 
@@ -29,17 +29,19 @@ pub(crate) fn labels_of(
         .map_or(0, |most| most.saturating_add(1));
     let nodes_from = features_from.saturating_add(features.numbers);
 
-    let mut objects: Vec<LabelledObject> = features
-        .features
-        .iter()
-        .map(|feature| LabelledObject {
-            class: feature.class.clone(),
-            instance: feature
-                .instance
-                .unwrap_or_else(|| features_from.saturating_add(feature.number)),
-            room: None,
-        })
-        .collect();
+    // Rooms are numbered in the order of their first features.
+    let mut rooms: HashMap<&str, i64> = HashMap::new();
+    let mut objects: Vec<LabelledObject> = Vec::new();
+    for feature in &features.features {
+        let room = feature.room.as_deref().map(|name| {
+            let next = rooms.len() as i64 + 1;
+            LabelledRoom { number: *rooms.entry(name).or_insert(next), name: Some(name.to_owned()) }
+        });
+        let instance = feature
+            .instance
+            .unwrap_or_else(|| features_from.saturating_add(feature.number));
+        objects.push(LabelledObject { class: feature.class.clone(), instance, room });
+    }
     let mut index: HashMap<u32, u32> = HashMap::new();
     let faces: Vec<u32> = node_of_face
         .iter()

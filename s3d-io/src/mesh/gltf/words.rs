@@ -17,6 +17,8 @@ pub(crate) const CLASS_KEYS: [&str; 8] =
 /// The keys of `extras`, and the properties of features, that hold the number of an object, in lower case.
 pub(crate) const INSTANCE_KEYS: [&str; 6] =
     ["instance", "instance_id", "instanceid", "object_id", "objectid", "id"];
+/// The property of features that holds the name of a room, in lower case.
+pub(crate) const ROOM_KEYS: [&str; 1] = ["room"];
 
 /// What a node says of itself.
 #[derive(Debug, Default, Deserialize)]

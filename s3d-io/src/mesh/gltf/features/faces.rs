@@ -14,7 +14,7 @@ use s3d_geom::NO_INDEX;
 use serde_json::Value;
 use std::collections::{BTreeMap, HashMap};
 
-/// The most bytes of all class words together. Any number of features can share the bytes of one word.
+/// The most bytes of all words together. Any number of features can share the bytes of one word.
 const MAX_WORDS: usize = if cfg!(fuzzing) { 1 << 24 } else { 1 << 30 };
 
 /// A feature that a face belongs to.
@@ -22,6 +22,8 @@ const MAX_WORDS: usize = if cfg!(fuzzing) { 1 << 24 } else { 1 << 30 };
 pub(crate) struct Feature {
     /// The word for its class.
     pub(crate) class: String,
+    /// The word for its room, if a property tells it.
+    pub(crate) room: Option<String>,
     /// The number of its object, if a property tells it.
     pub(crate) instance: Option<i64>,
     /// Its number among the features of all tables that tell classes: its id, if there is one table.
@@ -180,7 +182,7 @@ impl<'a> FaceFeatures<'a> {
 
         let mut features = Vec::new();
         let mut places = Vec::new();
-        let mut room = MAX_WORDS;
+        let mut left = MAX_WORDS;
         for &(i, row) in &self.rows {
             let table = self.from.tables.get(&i);
             let class = table.map(|table| table.class(row as usize)).transpose()?.flatten();
@@ -188,13 +190,16 @@ impl<'a> FaceFeatures<'a> {
                 places.push(NO_INDEX);
                 continue;
             };
-            room = room.checked_sub(class.len()).ok_or_else(|| {
+            let room = table.room(row as usize)?;
+            let bytes = class.len().saturating_add(room.map_or(0, str::len));
+            left = left.checked_sub(bytes).ok_or_else(|| {
                 format!("the words for their classes have more than {MAX_WORDS} bytes ({METADATA})")
             })?;
             places.push(u32::try_from(features.len()).unwrap_or(NO_INDEX));
             let start = starts.get(&i).copied().unwrap_or_default();
             features.push(Feature {
                 class: class.to_owned(),
+                room: room.map(str::to_owned),
                 instance: table.instance(row as usize),
                 number: start.saturating_add(row.into()),
             });

@@ -5,7 +5,7 @@
 use crate::fs::quote::quote;
 use crate::mesh::gltf::document::GltfDocument;
 use crate::mesh::gltf::packed::unpack::whole;
-use crate::mesh::gltf::words::{CLASS_KEYS, INSTANCE_KEYS, index_of};
+use crate::mesh::gltf::words::{CLASS_KEYS, INSTANCE_KEYS, ROOM_KEYS, index_of};
 use gltf::json::Index;
 use serde_json::{Map, Value};
 use std::collections::HashMap;
@@ -18,6 +18,7 @@ type SentenceResult<T> = Result<T, String>;
 pub(crate) struct Table<'a> {
     pub(crate) rows: usize,
     class: Words<'a>,
+    room: Option<Words<'a>>,
     instance: Option<Numbers<'a>>,
 }
 
@@ -137,15 +138,21 @@ impl<'a> Table<'a> {
             format!("{who} is of the class {class}, which the schema does not have")
         })?;
         let stored = |id: &str| table.get("properties").and_then(|all| all.get(id));
-        let class = find(properties, &CLASS_KEYS, |id, property| {
-            is_word(property) && (stored(id).is_some() || property.get("default").is_some())
-        });
-        let Some((id, property)) = class else { return Ok(None) };
+        let words = |keys| {
+            find(properties, keys, |id, property| {
+                is_word(property) && (stored(id).is_some() || property.get("default").is_some())
+            })
+        };
+        let Some(class) = words(&CLASS_KEYS) else { return Ok(None) };
 
         let rows = table.get("count").and_then(whole);
         let rows = rows.ok_or_else(|| format!("{who} has no count"))?;
-        let column = Column { document, rows, who: format!("{who}, property {}", quote(id.as_bytes())) };
-        let class = column.words(schema, property, stored(id))?;
+        let column = |(id, property): (&str, &'a Value)| {
+            let who = format!("{who}, property {}", quote(id.as_bytes()));
+            Column { document, rows, who }.words(schema, property, stored(id))
+        };
+        let room = words(&ROOM_KEYS).map(column).transpose()?;
+        let class = column(class)?;
 
         let instance = find(properties, &INSTANCE_KEYS, |id, property| {
             integer_of(property).is_some() && stored(id).is_some()
@@ -157,7 +164,7 @@ impl<'a> Table<'a> {
             let numbers = Column { document, rows, who }.numbers(stored(id)?, "values", kind, rows);
             Some(numbers.map(|numbers| Numbers { no_data, ..numbers }))
         });
-        Ok(Some(Self { rows, class, instance: instance.transpose()? }))
+        Ok(Some(Self { rows, class, room, instance: instance.transpose()? }))
     }
 
     /// Returns the word for the class of a feature, if it has one.
@@ -166,6 +173,14 @@ impl<'a> Table<'a> {
     /// The bytes of the word are damaged.
     pub(crate) fn class(&self, row: usize) -> SentenceResult<Option<&'a str>> {
         self.class.get(row)
+    }
+
+    /// Returns the word for the room of a feature, if it has one.
+    ///
+    /// # Errors
+    /// The bytes of the word are damaged.
+    pub(crate) fn room(&self, row: usize) -> SentenceResult<Option<&'a str>> {
+        self.room.as_ref().map_or(Ok(None), |words| words.get(row))
     }
 
     /// Returns the number of a feature's object, if it has one from 0 on.
