@@ -7,6 +7,7 @@ mod changed;
 mod cues;
 mod fill;
 mod library;
+mod parts;
 mod refined;
 mod storeys;
 mod strays;

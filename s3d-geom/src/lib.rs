@@ -88,7 +88,7 @@ pub use disjoint_sets::{DisjointSets, segment_graph};
 pub use glam;
 pub use mesh::{
     DEFAULT_COLOR, FaceColor, Material, MeshError, MeshParts, MeshReport, NO_INDEX, Texture, TriMesh, Wrap,
-    sample_bilinear,
+    moved_point, sample_bilinear,
 };
 #[cfg(feature = "nearest")]
 pub use nearest::{Nearest, NearestFaces, nearest_brute_force};

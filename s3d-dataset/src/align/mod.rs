@@ -4,6 +4,7 @@ mod read;
 mod report;
 
 pub use report::AlignReport;
+pub(crate) use report::rows;
 
 use crate::context::Context;
 use crate::error::{Error, Result, UsageError};
@@ -11,7 +12,7 @@ use crate::mesh_axes::MeshAxes;
 use crate::store::NewFile;
 use glam::{DAffine3, DVec3, Vec3};
 use read::{Read, has_ending, read};
-use s3d_fusion::{AlignError, AlignOptions as SearchOptions, Aligned, align as search};
+use s3d_fusion::{AlignError, AlignOptions as SearchOptions, Aligned, SurfacePoints, align as search};
 use s3d_geom::TriMesh;
 use s3d_io::mesh::{LengthUnit, MeshOut, UpAxis, write_ply_mesh, write_textured_glb};
 use std::num::NonZeroUsize;
@@ -103,9 +104,17 @@ pub fn align(a: &Path, b: &Path, options: &AlignOptions, ctx: &Context) -> Resul
         let near = DAffine3::from_translation(-read_b.offset_m)
             * place.b_from_a
             * DAffine3::from_translation(read_a.offset_m);
-        write(&moved(mesh, &near)?, output, read_b.offset_m, options.overwrite, ctx)?;
+        let moved = mesh.transformed(&near).map_err(|e| Error::unfit(a, e.to_string()))?;
+        write(&moved, output, read_b.offset_m, options.overwrite, ctx)?;
     }
     Ok(report)
+}
+
+/// Finds where the level mesh `a` lies in the frame of the level mesh `b`.
+pub(crate) fn align_meshes(a: &TriMesh, b: &TriMesh) -> std::result::Result<AlignReport, AlignError> {
+    let [a, b] = [SurfacePoints::of_mesh(a)?, SurfacePoints::of_mesh(b)?];
+    let how = SearchOptions { is_level: true, with_scale: false };
+    search(&a, &b, &how).map(|aligned| AlignReport::new(aligned, None))
 }
 
 /// The places in the frames of the files.
@@ -126,18 +135,6 @@ fn found(a: &Path, b: &Path, of_a: &Read, of_b: &Read, options: &AlignOptions) -
             * DAffine3::from_translation(-of_a.offset_m);
     }
     Ok(aligned)
-}
-
-/// A mesh after a motion. Normals of corners turn along.
-fn moved(mesh: TriMesh, motion: &DAffine3) -> Result<TriMesh> {
-    let mut parts = mesh.into_parts();
-    for p in &mut parts.positions {
-        *p = motion.transform_point3(p.as_dvec3()).as_vec3();
-    }
-    for n in &mut parts.normals {
-        *n = (motion.matrix3 * n.as_dvec3()).normalize_or_zero().as_vec3();
-    }
-    TriMesh::new(parts).map_err(|error| Error::unfit("the moved mesh", error.to_string()))
 }
 
 fn write(mesh: &TriMesh, path: &Path, offset_m: DVec3, overwrite: bool, ctx: &Context) -> Result<()> {

@@ -88,7 +88,7 @@ fn table(place: &Alignment) -> String {
 }
 
 /// A 4 × 4 matrix by rows.
-fn rows(m: &DAffine3) -> String {
+pub(crate) fn rows(m: &DAffine3) -> String {
     let [x, y, z] = m.matrix3.to_cols_array_2d();
     let t = m.translation.to_array();
     // Adding 0 turns −0 into 0.

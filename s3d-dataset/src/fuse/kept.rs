@@ -6,12 +6,16 @@ use crate::error::Result;
 use rayon::prelude::*;
 use s3d_io::Error as FileError;
 use s3d_io::fs::{Checksum, checksum_of_file, read_json};
+use s3d_io::mesh::MeshFormat;
 use s3d_io::raw::RawScan;
 use s3d_io::scene::{FuseSource, find_scene, read_scene};
 use serde::{Deserialize, Serialize};
 use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
+
+/// The scene file in a folder.
+const SCENE: &str = "scene.toml";
 
 /// What a kept mesh was made from. It is written beside the mesh.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -83,33 +87,57 @@ fn list(path: &Path, files: &mut Vec<PathBuf>) -> Result<()> {
 }
 
 /// Returns the scene file of what `path` names, if it is fused from a raw scan; the mesh is made if it is not
-/// there yet, or if the raw scan has changed. Returns `None` for a scene of another kind.
+/// there yet, or if the raw scan has changed. Returns `None` for a scene of another kind. The parts of a scene
+/// file are made likewise.
 ///
 /// # Errors
 /// Those of [`fuse_folder`].
 pub(crate) fn fused_scene(path: &Path, ctx: &Context) -> Result<Option<PathBuf>> {
+    // A faulty scene file is told by those that read it.
+    let scene = scene_file(path).and_then(|file| read_scene(&file).ok());
+    let parts = scene.into_iter().flat_map(|scene| scene.parts).map(|part| part.path);
+    for path in parts.filter(|path| MeshFormat::of(path).is_none()) {
+        fused_alone(&path, ctx)?;
+    }
+    fused_alone(path, ctx)
+}
+
+/// Does what [`fused_scene`] does, but for parts.
+fn fused_alone(path: &Path, ctx: &Context) -> Result<Option<PathBuf>> {
+    if let Some(file) = scene_file(path) {
+        let Some(source) = read_scene(&file).ok().and_then(|scene| scene.fuse) else { return Ok(None) };
+        ensure(&source.inputs, &source.folder, &FuseOptions::of_scene(&source), ctx)?;
+        return Ok(Some(file));
+    }
+
+    let Some(folder) = raw_folder(path)? else { return Ok(None) };
+    ensure(&[path.to_owned()], &folder, &FuseOptions::default(), ctx)?;
+    Ok(Some(folder.join(SCENE)))
+}
+
+/// Returns the scene file that `path` names, or that is in the folder of this name.
+fn scene_file(path: &Path) -> Option<PathBuf> {
     let file = if path.is_dir() {
-        path.join("scene.toml")
+        path.join(SCENE)
     } else {
         path.to_owned()
     };
     let is_toml = file
         .extension()
         .is_some_and(|ending| ending.eq_ignore_ascii_case("toml"));
-    if is_toml && file.is_file() {
-        // A faulty scene file is told by those that read it.
-        let Some(source) = read_scene(&file).ok().and_then(|scene| scene.fuse) else { return Ok(None) };
-        ensure(&source.inputs, &source.folder, &FuseOptions::of_scene(&source), ctx)?;
-        return Ok(Some(file));
-    }
+    (is_toml && file.is_file()).then_some(file)
+}
 
+/// Returns the scene file that [`fused_scene`] has made of what `path` names, if that is a raw scan itself.
+pub(crate) fn scene_of_raw(path: &Path) -> Result<Option<PathBuf>> {
+    Ok(raw_folder(path)?.map(|folder| folder.join(SCENE)))
+}
+
+/// Returns the folder that a raw scan is fused into; `None` if `path` is none.
+fn raw_folder(path: &Path) -> Result<Option<PathBuf>> {
     let is_known = path.is_dir() && (path.join("3d").is_dir() || find_scene(path)?.is_some());
-    if is_known || !path.exists() || RawScan::form_of(path)?.is_none() {
-        return Ok(None);
-    }
-    let folder = FuseSource::folder_of(path);
-    ensure(&[path.to_owned()], &folder, &FuseOptions::default(), ctx)?;
-    Ok(Some(folder.join("scene.toml")))
+    let is_raw = !is_known && path.exists() && RawScan::form_of(path)?.is_some();
+    Ok(is_raw.then(|| FuseSource::folder_of(path)))
 }
 
 /// Makes the fused mesh of inputs in `folder`, unless it is there.

@@ -18,7 +18,7 @@ mod scene_text;
 mod surface;
 mod tiles;
 
-pub(crate) use kept::fused_scene;
+pub(crate) use kept::{fused_scene, scene_of_raw};
 pub use options::FuseOptions;
 
 use crate::context::Context;

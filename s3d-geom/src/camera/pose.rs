@@ -5,7 +5,7 @@
 //! files).
 
 use crate::CameraError;
-use glam::{DMat3, DQuat, DVec3, dvec3};
+use glam::{DAffine3, DMat3, DQuat, DVec3, dvec3};
 use std::f64::consts::FRAC_PI_2;
 
 /// Returns the rotation Rz·Ry·Rx of three angles in radians.
@@ -195,6 +195,21 @@ impl Pose {
     #[must_use]
     pub fn leveled(&self) -> Self {
         Self::level(self.location, self.azimuth_rad() - FRAC_PI_2)
+    }
+
+    /// Returns the pose after a rotation with a scale and a shift of the world.
+    #[must_use]
+    pub fn moved(&self, by: &DAffine3) -> Self {
+        if *by == DAffine3::IDENTITY {
+            return *self;
+        }
+        let m = by.matrix3;
+        let scale = m.x_axis.length();
+        let turn = DMat3::from_cols(m.x_axis / scale, m.y_axis / scale, m.z_axis / scale);
+        Self {
+            location: by.transform_point3(self.location),
+            world_from_camera: turn * self.world_from_camera,
+        }
     }
 
     /// Returns the direction to the right of the image, in the world; a unit vector.

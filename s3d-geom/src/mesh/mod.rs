@@ -1,9 +1,11 @@
 //! Textured triangle meshes, checked once, by their constructor.
 
+mod edit;
 mod merge;
 mod repeated;
 pub(crate) mod texture;
 
+pub use edit::moved_point;
 pub use texture::{Texture, Wrap, sample_bilinear};
 
 use crate::Aabb;

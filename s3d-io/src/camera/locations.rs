@@ -8,8 +8,7 @@ use crate::camera::table::{ScanLocation, parse_cameras};
 use crate::camera::{located, poses};
 use crate::error::{Error, Result};
 use crate::fs::open::read_file;
-use s3d_geom::Pose;
-use s3d_geom::glam::{DAffine3, DMat3};
+use s3d_geom::glam::DAffine3;
 use std::path::{Path, PathBuf};
 
 /// The supported forms, for messages.
@@ -64,7 +63,7 @@ pub fn read_scan_locations(path: &Path, world_from_file: &DAffine3) -> Result<Ve
 fn all_moved(mut locations: Vec<ScanLocation>, world_from_file: &DAffine3) -> Vec<ScanLocation> {
     locations
         .iter_mut()
-        .for_each(|l| l.pose = moved(&l.pose, world_from_file));
+        .for_each(|l| l.pose = l.pose.moved(world_from_file));
     locations
 }
 
@@ -86,7 +85,7 @@ fn read_folder(path: &Path, world_from_file: &DAffine3) -> Result<Vec<ScanLocati
     }
     let mut locations = read_matterport_locations(path)?;
     for location in &mut locations {
-        location.pose = moved(&location.pose, world_from_file);
+        location.pose = location.pose.moved(world_from_file);
         // Captures have no lines.
         location.line = 0;
     }
@@ -99,9 +98,7 @@ fn picture_locations(
     mut pictures: Vec<PosedCamera>,
     world_from_file: &DAffine3,
 ) -> Result<Vec<ScanLocation>> {
-    pictures
-        .iter_mut()
-        .for_each(|p| p.pose = moved(&p.pose, world_from_file));
+    pictures.iter_mut().for_each(|p| p.pose = p.pose.moved(world_from_file));
     located::locations_of(path, pictures)
 }
 
@@ -128,28 +125,13 @@ pub(crate) fn has_transforms(dir: &Path) -> Option<PathBuf> {
     Some(dir.join("transforms.json")).filter(|path| path.is_file())
 }
 
-/// Returns the pose in the world, from the pose in a file's frame. The frame may be scaled, by one factor for
-/// all axes.
-pub(crate) fn moved(pose: &Pose, world_from_file: &DAffine3) -> Pose {
-    if *world_from_file == DAffine3::IDENTITY {
-        return *pose;
-    }
-
-    let m = world_from_file.matrix3;
-    let scale = m.x_axis.length();
-    let turn = DMat3::from_cols(m.x_axis / scale, m.y_axis / scale, m.z_axis / scale);
-    Pose {
-        location: world_from_file.transform_point3(pose.location),
-        world_from_camera: turn * pose.world_from_camera,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::dataset::layout::Frame;
     use crate::dataset::pose::PoseFile;
-    use s3d_geom::glam::{DQuat, DVec3, dvec3};
+    use s3d_geom::Pose;
+    use s3d_geom::glam::{DMat3, DQuat, DVec3, dvec3};
     use std::fs;
 
     const IMAGES: &str = "1 1 0 0 0 0 0 0 1 a.jpg\n\n";
@@ -216,7 +198,7 @@ mod tests {
         let location = &read_scan_locations(&path, &world).unwrap()[0];
         assert!(location.pose.location.abs_diff_eq(dvec3(10.0, 2.0, 1.0), 1e-12), "{:?}", location.pose);
         assert!(location.pose.forward().abs_diff_eq(DVec3::Y, 1e-12));
-        let turned = moved(&Pose::level(DVec3::ZERO, 0.0), &DAffine3::from_quat(DQuat::from_rotation_z(0.5)));
+        let turned = Pose::level(DVec3::ZERO, 0.0).moved(&DAffine3::from_quat(DQuat::from_rotation_z(0.5)));
         assert!(
             turned
                 .forward()

@@ -1,6 +1,6 @@
 //! Cameras with poses, from any supported list.
 
-use crate::camera::locations::{has_transforms, is_colmap_images, moved};
+use crate::camera::locations::{has_transforms, is_colmap_images};
 use crate::camera::other_kind::refuse_other_kind;
 use crate::camera::posed::PosedCamera;
 use crate::camera::programs::sens::Recording;
@@ -97,7 +97,7 @@ pub fn read_photograph_cameras(
     let ReadList { mut cameras, untracked, files, named: file } = read(path, images)?;
     cameras
         .iter_mut()
-        .for_each(|camera| camera.pose = moved(&camera.pose, world_from_file));
+        .for_each(|camera| camera.pose = camera.pose.moved(world_from_file));
 
     cameras
         .iter()

@@ -77,7 +77,8 @@ pub(crate) mod text;
 mod words;
 
 pub use annotations::{
-    AnnotatedInstance, AnnotatedPoints, AnnotatedRoom, AnnotationOptions, Annotations, Skipped,
+    AnnotatedInstance, AnnotatedPoints, AnnotatedRoom, AnnotationOptions, Annotations, PlacedInstance,
+    Skipped,
 };
 pub use frame_gap::FrameGap;
 #[cfg(feature = "labels")]

@@ -95,7 +95,7 @@ impl MeshFile {
 
     /// Makes a mesh of the file `path`, without textures, labels or warnings.
     pub(crate) fn new(path: &Path, mesh: TriMesh) -> Self {
-        let source = MeshSource { path: path.to_owned(), first_face: 0, first_vertex: 0 };
+        let source = MeshSource { path: path.to_owned(), first_face: 0 };
         Self {
             mesh,
             texture_files: Vec::new(),
@@ -145,15 +145,13 @@ impl MeshFile {
     }
 }
 
-/// A file that a mesh comes from. Its faces and vertices end where the next file's begin.
+/// A file that a mesh comes from. Its faces end where the next file's begin.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MeshSource {
     /// The file.
     pub path: PathBuf,
     /// Its first face in the mesh.
     pub first_face: u32,
-    /// Its first vertex in the mesh.
-    pub first_vertex: u32,
 }
 
 /// The unit of a file's coordinates.

@@ -5,6 +5,7 @@ use crate::mesh::file::{MeshFile, MeshOptions, MeshSource, UpAxis};
 use crate::mesh::labels::{LabelColumn, LabelElement, MeshLabels, NO_LABEL};
 use crate::mesh::origin::MeshOrigin;
 use crate::mesh::read::read_mesh_with;
+use s3d_geom::glam::DAffine3;
 use s3d_geom::{NO_INDEX, TriMesh};
 use std::path::{Path, PathBuf};
 
@@ -45,21 +46,89 @@ pub fn read_meshes_with(paths: &[PathBuf], up: UpAxis, options: &MeshOptions) ->
         ..options.clone()
     };
 
-    for path in others {
+    let others = others.iter().map(|path| {
         let mut next = read_mesh_with(path, up, &options)?;
         name_warnings(&mut next.warnings, path);
-        joined = join(joined, next)?;
+        Ok(next)
+    });
+    MeshFile::joined(joined, others).map(|(joined, _)| joined)
+}
+
+impl MeshFile {
+    /// Joins meshes of one frame in this order, as [`read_meshes`] joins files. Returns also where each face
+    /// of the joined mesh was among the faces of all meshes, ascending: a face that repeats an earlier one is
+    /// left out.
+    ///
+    /// # Errors
+    /// The first error among `others`; [`Error::Format`] if the meshes have too many vertices together.
+    pub fn joined(self, others: impl IntoIterator<Item = Result<Self>>) -> Result<(Self, Vec<u32>)> {
+        let mut joined = self;
+        for next in others {
+            joined = join(joined, next?)?;
+        }
+
+        let faces = joined.mesh.faces().len() as u32;
+        joined.mesh = joined.mesh.with_face_tags((0..faces).collect());
+        let (mut joined, kept) = joined.tidy();
+        joined.renumber_faces(&kept);
+        Ok((joined, kept))
     }
 
-    let faces = joined.mesh.faces().len() as u32;
-    joined.mesh = joined.mesh.with_face_tags((0..faces).collect());
-    let (mut joined, kept) = joined.tidy();
-    let source_faces = kept.iter().filter_map(|&face| joined.source_faces.get(face as usize));
-    joined.source_faces = source_faces.copied().collect();
-    for source in &mut joined.sources {
-        source.first_face = kept.partition_point(|&face| face < source.first_face) as u32;
+    /// Picks the sources of faces after only the faces `kept`, ascending, have stayed.
+    fn renumber_faces(&mut self, kept: &[u32]) {
+        let source_faces = kept.iter().filter_map(|&face| self.source_faces.get(face as usize));
+        self.source_faces = source_faces.copied().collect();
+        for source in &mut self.sources {
+            source.first_face = kept.partition_point(|&face| face < source.first_face) as u32;
+        }
     }
-    Ok(joined)
+
+    /// Returns the mesh after a transform, without its labels. Returns also which faces have stayed,
+    /// ascending: one that is too thin may lose its area.
+    ///
+    /// # Errors
+    /// [`Error::Format`] if no face has stayed, or a vertex is infinitely far.
+    pub fn transformed(mut self, by: &DAffine3) -> Result<(Self, Vec<u32>)> {
+        self.labels = None;
+        let mut faces: Vec<u32> = (0..self.mesh.faces().len() as u32).collect();
+        if *by != DAffine3::IDENTITY {
+            let path = self
+                .sources
+                .first()
+                .map(|source| source.path.clone())
+                .unwrap_or_default();
+            let tagged = self.mesh.with_face_tags(faces);
+            let mut mesh = tagged
+                .transformed(by)
+                .map_err(|e| Error::format(&path, e.to_string()))?;
+            faces = mesh.take_face_tags();
+            self.mesh = mesh;
+        }
+        self.renumber_faces(&faces);
+        Ok((self, faces))
+    }
+
+    /// Returns the mesh of some of its faces, ascending, without its labels. If these are not all, vertices
+    /// that none of them uses are left out.
+    ///
+    /// # Errors
+    /// [`Error::Format`] if there is no face.
+    pub fn with_faces(mut self, faces: &[u32]) -> Result<Self> {
+        self.labels = None;
+        if faces.len() < self.mesh.faces().len() {
+            let path = self
+                .sources
+                .first()
+                .map(|source| source.path.clone())
+                .unwrap_or_default();
+            self.mesh = self
+                .mesh
+                .with_faces(faces)
+                .map_err(|e| Error::format(&path, e.to_string()))?;
+            self.renumber_faces(faces);
+        }
+        Ok(self)
+    }
 }
 
 /// Appends the mesh `next` to `joined`.
@@ -76,7 +145,6 @@ fn join(joined: MeshFile, next: MeshFile) -> Result<MeshFile> {
     }
 
     let first_face = joined.mesh.faces().len() as u32;
-    let first_vertex = joined.mesh.positions().len() as u32;
     let labels = match (joined.labels, next.labels) {
         (None, None) => None,
         (a, b) if has_objects(&a) || has_objects(&b) => {
@@ -85,11 +153,11 @@ fn join(joined: MeshFile, next: MeshFile) -> Result<MeshFile> {
         (a, b) => Some(joined_labels((a, &joined.mesh), (b, &next.mesh))),
     };
     let mut sources = joined.sources;
-    sources.extend(next.sources.into_iter().map(|s| MeshSource {
-        path: s.path,
-        first_face: first_face + s.first_face,
-        first_vertex: first_vertex + s.first_vertex,
-    }));
+    sources.extend(
+        next.sources
+            .into_iter()
+            .map(|s| MeshSource { path: s.path, first_face: first_face + s.first_face }),
+    );
 
     Ok(MeshFile {
         unit_said: joined.unit_said,
@@ -266,7 +334,6 @@ mod tests {
 
         assert_eq!(file.texture_files.iter().flatten().count(), 2);
         assert_eq!((0..3).map(|s| file.faces_of(s)).collect::<Vec<_>>(), [0..2, 2..4, 4..5]);
-        assert_eq!(file.sources.iter().map(|s| s.first_vertex).collect::<Vec<_>>(), [0, 4, 8]);
         assert_eq!(file.repeated_faces, 3);
         for (warning, path) in file.warnings.iter().zip(&paths) {
             let words = format!("{}: 1 face left out: earlier faces", path.display());

@@ -44,6 +44,11 @@ impl AnnotationTable {
         }
     }
 
+    /// Returns whether the labels of the mesh itself are meant.
+    pub(crate) fn is_of_mesh(&self) -> bool {
+        self.mesh
+    }
+
     /// Returns whether the table says what is subtracted from coordinates.
     pub(crate) fn has_offset(&self) -> bool {
         self.offset_m.is_some()

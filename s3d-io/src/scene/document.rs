@@ -11,6 +11,7 @@ use crate::scene::folder::SceneFolder;
 use crate::scene::frames::FramesTable;
 use crate::scene::fuse::{FuseKeys, FusePaths, FuseSource};
 use crate::scene::other_kind::{SCENE, other_kind};
+use crate::scene::parts::{PartTable, part_sources};
 use crate::scene::rgb::{PictureKind, PictureSource, RgbEntry};
 use crate::scene::taxonomy::TaxonomyEntry;
 use crate::scene::toml_fault::toml_fault;
@@ -26,6 +27,8 @@ struct Document {
     area: NonZeroU32,
     taxonomy: Option<TaxonomyEntry>,
     published: Option<PublishedTable>,
+    #[serde(default)]
+    parts: Vec<PartTable>,
     mesh: Option<MeshTable>,
     annotations: Option<AnnotationTable>,
     cameras: Option<CamerasTable>,
@@ -120,6 +123,18 @@ struct MeshTable {
 /// transform = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
 /// ```
 ///
+/// An area that was scanned in parts is joined from their scenes. `[cameras]` and `[annotations]` of the whole
+/// area may be given beside them:
+///
+/// ```toml
+/// area = 5
+/// [[parts]]
+/// path  = "5a.toml"   # a scene file, a published area, a mesh, a raw scan, a folder of another data set
+/// [[parts]]
+/// path  = "5b.toml"
+/// align = true        # or transform, from its frame to the area's; left out: they share a frame
+/// ```
+///
 /// The other keys of `[rgb]` are the fields of [`PictureOptions`](crate::scene::PictureOptions). The other
 /// keys of `[frames]` are the fields of [`FrameSource`](crate::scene::FrameSource), with `up` and `transform`
 /// as in `[cameras]`.
@@ -176,11 +191,22 @@ pub fn parse_scene(text: &str, path: &Path) -> Result<SceneFile> {
             return Err(folder.fault("[published] brings a taxonomy: leave out the key"));
         }
     }
+    if !document.parts.is_empty()
+        && let Some(key) = document.besides_parts()
+    {
+        let message = format!("[[parts]] bring their meshes, labels and pictures: leave out {key}");
+        return Err(folder.fault(message));
+    }
     (scene.taxonomy, scene.taxonomy_file) = document
         .taxonomy
         .map_or(Ok((Taxonomy::s3dis(), None)), |entry| entry.taxonomy(path))?;
 
-    if scene.published.is_none() {
+    if !document.parts.is_empty() {
+        scene.parts = part_sources(document.parts, folder)?;
+        if let Some(table) = &document.annotations {
+            add_annotations(table, &mut scene, folder)?;
+        }
+    } else if scene.published.is_none() {
         let mesh = document.mesh.ok_or_else(|| folder.fault("missing field `mesh`"))?;
         scene.fuse = mesh.fuse_keys().source(path, folder)?;
         scene.mesh = match &scene.fuse {
@@ -198,6 +224,22 @@ pub fn parse_scene(text: &str, path: &Path) -> Result<SceneFile> {
         .map_or(Ok(None), |entry| picture_source(entry, &scene, folder))?;
     scene.frames = document.frames.map(|table| table.source(folder)).transpose()?;
     Ok(scene)
+}
+
+impl Document {
+    /// The first key that no area of parts has.
+    fn besides_parts(&self) -> Option<&'static str> {
+        let of_meshes = self.annotations.as_ref().is_some_and(AnnotationTable::is_of_mesh);
+        let keys = [
+            ("[published]", self.published.is_some()),
+            ("[mesh]", self.mesh.is_some()),
+            ("rgb", self.rgb.is_some()),
+            ("[frames]", self.frames.is_some()),
+            ("annotations.mesh", of_meshes),
+            ("taxonomy", self.taxonomy.is_some() && self.annotations.is_none()),
+        ];
+        keys.into_iter().find(|(_, is_given)| *is_given).map(|(key, _)| key)
+    }
 }
 
 impl PublishedTable {

@@ -5,6 +5,7 @@ use crate::mesh::file::{LengthUnit, UpAxis};
 use crate::scene::cameras::CameraSource;
 use crate::scene::frames::FrameSource;
 use crate::scene::fuse::FuseSource;
+use crate::scene::parts::PartSource;
 use crate::scene::rgb::PictureSource;
 use s3d_geom::glam::{DAffine3, DVec3};
 use s3d_label::Taxonomy;
@@ -25,6 +26,9 @@ pub struct SceneFile {
     /// The transform from the published area's frame to the world: a rotation, a shift and a scale. It is
     /// meant for areas 5a and 5b, whose frames differ.
     pub world_from_published: DAffine3,
+    /// The parts that the area is joined from. If there are some, they bring meshes, pictures, and labels
+    /// unless `is_labelled`, and there is no `mesh`.
+    pub parts: Vec<PartSource>,
     /// The files of the textured mesh, at least one. Several are joined in this order.
     pub mesh: Vec<PathBuf>,
     /// The raw scan that the mesh is fused from. `mesh` is then its [`FuseSource::mesh`], which need not
@@ -89,6 +93,7 @@ impl SceneFile {
             area: 1,
             published: None,
             world_from_published: DAffine3::IDENTITY,
+            parts: Vec::new(),
             mesh,
             fuse: None,
             up,

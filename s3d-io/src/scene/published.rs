@@ -258,17 +258,9 @@ impl PublishedArea {
 impl PublishedMesh {
     /// Transforms positions and normals. Labels stay with their faces.
     fn turn(&mut self, world_from_area: &DAffine3) -> std::result::Result<(), s3d_geom::MeshError> {
-        let mut parts = self.file.mesh.parts().clone();
-        let normal_from = world_from_area.matrix3.inverse().transpose();
-        for p in &mut parts.positions {
-            *p = world_from_area.transform_point3(p.as_dvec3()).as_vec3();
-        }
-        for n in &mut parts.normals {
-            *n = (normal_from * n.as_dvec3()).normalize_or_zero().as_vec3();
-        }
-
-        parts.face_tags = std::mem::take(&mut self.label_of_face);
-        self.file.mesh = TriMesh::new(parts)?;
+        let labels = std::mem::take(&mut self.label_of_face);
+        let labelled = self.file.mesh.clone().with_face_tags(labels);
+        self.file.mesh = labelled.transformed(world_from_area)?;
         self.label_of_face = self.file.mesh.take_face_tags();
         Ok(())
     }

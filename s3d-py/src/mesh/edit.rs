@@ -5,8 +5,8 @@ use crate::error::{exception, usage};
 use crate::work::detached;
 use pyo3::prelude::*;
 use s3d_dataset::Error;
-use s3d_geom::glam::{DAffine3, DMat3, DVec3, Vec3};
-use s3d_geom::{MeshError, MeshParts, NO_INDEX, TriMesh};
+use s3d_geom::glam::{DAffine3, DMat3, DVec3};
+use s3d_geom::{MeshError, MeshParts, TriMesh};
 use s3d_io::Error as FileError;
 use s3d_io::mesh::{MeshFile, MeshOut, write_ply_mesh, write_textured_glb};
 use std::path::PathBuf;
@@ -29,31 +29,15 @@ pub(crate) fn merged(py: Python<'_>, meshes: Vec<Bound<'_, Mesh>>) -> PyResult<M
 pub(crate) fn transformed(py: Python<'_>, mesh: &Bound<'_, Mesh>, matrix: [[f64; 4]; 4]) -> PyResult<Mesh> {
     let column = |k: usize| DVec3::new(matrix[0][k], matrix[1][k], matrix[2][k]);
     let linear = DMat3::from_cols(column(0), column(1), column(2));
-    let determinant = linear.determinant();
     let is_affine = matrix[3] == [0.0, 0.0, 0.0, 1.0] && matrix.as_flattened().iter().all(|m| m.is_finite());
-    if !is_affine || determinant == 0.0 {
+    if !is_affine || linear.determinant() == 0.0 {
         return Err(usage("matrix: an affine transform that is no projection: its last row is 0 0 0 1"));
     }
 
     let file = Arc::clone(&mesh.get().file);
     made(py, || {
-        let mut parts = file.mesh.parts().clone();
         let transform = DAffine3::from_mat3_translation(linear, column(3));
-        let of_normals = linear.inverse().transpose();
-        let each = |v: &mut Vec3, change: &dyn Fn(DVec3) -> DVec3| *v = change(v.as_dvec3()).as_vec3();
-        parts
-            .positions
-            .iter_mut()
-            .for_each(|p| each(p, &|p| transform.transform_point3(p)));
-        parts
-            .normals
-            .iter_mut()
-            .for_each(|n| each(n, &|n| (of_normals * n).normalize()));
-        // A mirror turns faces over.
-        if determinant < 0.0 {
-            parts.flip();
-        }
-        TriMesh::new(parts)
+        file.mesh.clone().transformed(&transform)
     })
 }
 
@@ -65,38 +49,7 @@ pub(crate) fn with_faces(py: Python<'_>, mesh: &Bound<'_, Mesh>, faces: Vec<u32>
     if let Some(face) = faces.iter().find(|face| **face as usize >= count) {
         return Err(usage(format!("faces: {face}, and there are {count}")));
     }
-    made(py, || TriMesh::new(some_faces(file.mesh.parts(), &faces)))
-}
-
-fn some_faces(parts: &MeshParts, faces: &[u32]) -> MeshParts {
-    fn of_faces<T: Copy>(column: &[T], faces: &[u32]) -> Vec<T> {
-        let of = |face: &u32| column.get(*face as usize).copied();
-        faces.iter().filter_map(of).collect()
-    }
-
-    // Vertices keep their order.
-    let mut corners = of_faces(&parts.faces, faces);
-    let mut number = vec![NO_INDEX; parts.positions.len()];
-    corners.iter().flatten().for_each(|v| number[*v as usize] = 0);
-    let mut kept = Vec::new();
-    for (vertex, number) in (0..).zip(&mut number).filter(|(_, number)| **number == 0) {
-        *number = kept.len() as u32;
-        kept.push(vertex);
-    }
-    corners.iter_mut().flatten().for_each(|v| *v = number[*v as usize]);
-    MeshParts {
-        positions: of_faces(&parts.positions, &kept),
-        colors: of_faces(&parts.colors, &kept),
-        faces: corners,
-        uvs: parts.uvs.clone(),
-        face_uvs: of_faces(&parts.face_uvs, faces),
-        normals: parts.normals.clone(),
-        face_normals: of_faces(&parts.face_normals, faces),
-        materials: parts.materials.clone(),
-        face_materials: of_faces(&parts.face_materials, faces),
-        textures: parts.textures.clone(),
-        face_tags: Vec::new(),
-    }
+    made(py, || file.mesh.with_faces(&faces))
 }
 
 /// Writes a mesh as a GLB file with its textures, or as a PLY file with the colours of its vertices.

@@ -123,7 +123,10 @@ pub(crate) fn write_images(
     for shots in shots.chunk_by(|a, b| a.location == b.location) {
         let location = shots[0].location;
         let cube = pictures.cube(ctx, location, &job.locations[location], job.channels.scene)?;
-        let channels = Channels { pictures: cube.as_ref().map(|cube| pictures.colors(cube)), ..job.channels };
+        let channels = Channels {
+            pictures: cube.as_ref().and_then(|cube| pictures.colors(location, cube)),
+            ..job.channels
+        };
         write_shots(ctx, &ImageJob { channels, ..alone }, shots, &open, assets.take(), &progress)?;
     }
     write_shots(ctx, job, &[], &open, assets, &progress)

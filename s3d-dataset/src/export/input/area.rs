@@ -12,11 +12,13 @@ use crate::record::request::InputRecord;
 use crate::survey::annotated::SurveyedRoom;
 use crate::survey::room_names::{InstanceName, RoomNames};
 use crate::useful::{Estimate, Finding, count_findings};
+use glam::{DAffine3, DVec3};
 use s3d_geom::{Camera, TriMesh};
 use s3d_io::cloud::AnnotatedInstance;
 use s3d_io::mesh::{LengthUnit, MeshFile, UpAxis};
 use s3d_io::scene::PictureSource;
 use s3d_label::{Label, Room, Taxonomy};
+use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -31,8 +33,8 @@ pub(crate) struct AreaInput {
     pub(crate) frame: MeshFrame,
     /// Its mesh itself, if it is to stay in memory.
     pub(super) mesh_file: Option<Arc<MeshFile>>,
-    /// The scanner's pictures, if colours are taken from them.
-    pub(crate) pictures: Option<PictureSource>,
+    /// The scanner's pictures; empty if colours are not taken from them.
+    pub(crate) pictures: Vec<PictureSet>,
     /// Whether there are labels at all.
     pub(crate) is_labelled: bool,
     /// Which classes and types of rooms it has.
@@ -61,6 +63,24 @@ pub(crate) struct AreaInput {
     pub(crate) found: Option<String>,
     /// The records of inputs that are no files.
     pub(crate) records: Vec<InputRecord>,
+}
+
+/// The scanner's pictures of some scan locations.
+pub(crate) struct PictureSet {
+    pub(crate) source: PictureSource,
+    /// Which of the listed locations they are of.
+    pub(crate) locations: Range<usize>,
+    /// What is subtracted from places where they were taken, metres, world axes.
+    pub(crate) offset_m: DVec3,
+    /// Then they are moved, if they are of a part of the area.
+    pub(crate) scene_from_part: DAffine3,
+}
+
+impl PictureSet {
+    /// From the frame that the poses of the pictures are read in to where the mesh lies.
+    pub(crate) fn mesh_from_poses(&self) -> DAffine3 {
+        self.scene_from_part * DAffine3::from_translation(-self.offset_m)
+    }
 }
 
 /// One room of an area.
@@ -112,7 +132,7 @@ impl AreaInput {
     pub(crate) fn mesh_axes(&self) -> Option<(UpAxis, Option<LengthUnit>)> {
         match &self.source {
             MeshSource::Files { up, options, .. } => Some((*up, options.units)),
-            MeshSource::Published(_) | MeshSource::Memory(_) => None,
+            MeshSource::Published(_) | MeshSource::Memory(_) | MeshSource::Parts(..) => None,
         }
     }
 
@@ -137,12 +157,14 @@ impl AreaInput {
         count_findings(self.cameras.count_on(floor_m2), rooms)
     }
 
-    /// The list of labels of a published area.
+    /// The list of labels of a published area, whose labels keep their names.
     pub(super) fn published_labels(&self) -> Option<&PathBuf> {
-        match &self.source {
-            MeshSource::Published(area) => area.labels.as_ref(),
-            MeshSource::Files { .. } | MeshSource::Memory(_) => None,
-        }
+        self.source.published_labels()
+    }
+
+    /// The words for the source of colours in the record of a data set.
+    pub(crate) fn rgb_source(&self) -> &'static str {
+        self.pictures.first().map_or("texture", |set| set.source.kind.name())
     }
 
     /// Returns what was odd in mesh, annotations and photographs, a sentence each.

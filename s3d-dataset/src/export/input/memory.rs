@@ -223,7 +223,7 @@ impl AreaInput {
             source: MeshSource::Memory(Arc::clone(&scene.mesh)),
             frame,
             mesh_file: Some(Arc::clone(&scene.mesh)),
-            pictures: None,
+            pictures: Vec::new(),
             is_labelled: scene.annotations.is_some(),
             taxonomy: scene
                 .annotations

@@ -2,7 +2,7 @@
 
 use crate::context::Context;
 use crate::error::{Error, Result};
-use glam::DVec3;
+use glam::{DAffine3, DVec3};
 use s3d_geom::Aabb;
 use s3d_io::camera::ScanLocation;
 use s3d_io::cloud::{Annotations, FrameGap};
@@ -22,6 +22,28 @@ pub(crate) enum MeshSource {
     },
     Published(Box<PublishedArea>),
     Memory(Arc<MeshFile>),
+    /// Joined from the first part and the others.
+    Parts(Box<PartMesh>, Vec<PartMesh>),
+}
+
+/// The mesh of a part.
+pub(crate) struct PartMesh {
+    pub(super) source: MeshSource,
+    /// From where the part's mesh lies to where the area's mesh lies.
+    pub(super) scene_from_part: DAffine3,
+    /// The faces that stay, of those that the moved mesh has. `None`: all of them.
+    pub(super) faces: Option<Vec<u32>>,
+}
+
+impl PartMesh {
+    fn read(&self) -> Result<MeshFile> {
+        let file = Arc::unwrap_or_clone(self.source.read()?);
+        let (moved, _) = file.transformed(&self.scene_from_part)?;
+        match &self.faces {
+            Some(faces) => Ok(moved.with_faces(faces)?),
+            None => Ok(moved),
+        }
+    }
 }
 
 impl MeshSource {
@@ -36,13 +58,31 @@ impl MeshSource {
                 file
             }
             Self::Published(area) => area.read_mesh()?.file,
+            Self::Parts(first, others) => {
+                let others = others.iter().map(PartMesh::read).collect::<Result<Vec<_>>>()?;
+                let (joined, _) = first.read()?.joined(others.into_iter().map(Ok))?;
+                joined
+            }
         };
         Ok(Arc::new(file))
+    }
+
+    /// The list of labels of a published area, or of the first part if all parts are published.
+    pub(super) fn published_labels(&self) -> Option<&PathBuf> {
+        match self {
+            Self::Published(area) => area.labels.as_ref(),
+            Self::Parts(first, others) => {
+                let are_published = others.iter().all(|part| part.source.published_labels().is_some());
+                first.source.published_labels().filter(|_| are_published)
+            }
+            Self::Files { .. } | Self::Memory(_) => None,
+        }
     }
 
     pub(crate) fn describe(&self) -> String {
         match self {
             Self::Published(area) => area.mesh.display().to_string(),
+            Self::Parts(first, others) => format!("{} and {} more", first.source.describe(), others.len()),
             Self::Memory(file) => file
                 .sources
                 .first()

@@ -7,6 +7,7 @@ pub(crate) mod masks;
 pub(crate) mod memory;
 pub(crate) mod mesh;
 mod numbering;
+mod parts;
 pub(crate) mod photographs;
 pub(crate) mod pictures;
 mod published;
@@ -14,11 +15,12 @@ pub(crate) mod requested;
 mod scene;
 pub(crate) mod stamps;
 
-use crate::error::{InputError, Result};
+use crate::error::{Error, InputError, Result};
 use crate::export::input::area::AreaInput;
 use crate::export::input::memory::SceneSource;
 use crate::export::input::numbering::label_table;
 use crate::export::input::scene::Opened;
+use crate::fuse::scene_of_raw;
 use crate::mesh_axes::MeshAxes;
 use crate::options::placing::Placing;
 use s3d_io::Error as FileError;
@@ -80,38 +82,14 @@ impl Inputs {
         lenient: bool,
         annotations: bool,
     ) -> Result<Vec<AreaInput>> {
-        let opened = Opened { annotations, keep_mesh: scenes.len() == 1 };
+        let opened = Opened { annotations, keep_mesh: scenes.len() == 1, is_part: false };
 
         let mut areas: Vec<AreaInput> = Vec::new();
         let mut area_of: BTreeMap<u32, PathBuf> = BTreeMap::new();
         let mut location_of: BTreeMap<String, PathBuf> = BTreeMap::new();
 
         for scene in scenes {
-            let area = match scene {
-                SceneSource::Memory(scene) => AreaInput::in_memory(scene, asked, opened)?,
-                SceneSource::Path(path) if path.is_dir() && !path.join(SCENE).is_file() => {
-                    match s3d_io::scene::find_scene(path)? {
-                        Some(mut found) => {
-                            let options = &mut found.scene.annotation_options;
-                            set_reading(options, lenient, scenes.len());
-                            AreaInput::found(found, asked, opened)?
-                        }
-                        None if !path.join("3d").is_dir() => return Err(no_scene(path).into()),
-                        None => AreaInput::published(path, None, asked, opened)?,
-                    }
-                }
-                SceneSource::Meshes { paths, up, units } => {
-                    AreaInput::of_meshes(paths, MeshAxes { up: *up, units: *units }, asked, opened)?
-                }
-                SceneSource::Path(path) => {
-                    let in_folder = path.join(SCENE);
-                    let file = if path.is_dir() { &in_folder } else { path };
-                    let mut scene = s3d_io::scene::read_scene(file)?;
-                    set_reading(&mut scene.annotation_options, lenient, scenes.len());
-                    AreaInput::open(scene, asked, opened)?
-                }
-            };
-
+            let area = open_area(scene, asked, lenient, scenes.len(), opened)?;
             let path = &area.path;
             if let Some(other) = area_of.insert(area.number, path.clone()) {
                 return Err(
@@ -149,6 +127,61 @@ impl Inputs {
     pub(crate) fn numbers(&self) -> Vec<u32> {
         self.areas.iter().map(|a| a.number).collect()
     }
+}
+
+/// Opens a scene, which is one of several.
+fn open_area(
+    scene: &SceneSource,
+    asked: Option<Placing>,
+    lenient: bool,
+    scenes: usize,
+    opened: Opened,
+) -> Result<AreaInput> {
+    let mut file = match scene {
+        SceneSource::Memory(scene) => return AreaInput::in_memory(scene, asked, opened),
+        SceneSource::Meshes { paths, up, units } => {
+            return AreaInput::of_meshes(paths, MeshAxes { up: *up, units: *units }, asked, opened);
+        }
+        SceneSource::Path(path) => path.clone(),
+    };
+    if file.is_dir() && !file.join(SCENE).is_file() {
+        let Some(mut found) = s3d_io::scene::find_scene(&file)? else {
+            if !file.join("3d").is_dir() {
+                return Err(no_scene(&file).into());
+            }
+            return AreaInput::published(&file, None, asked, opened);
+        };
+        set_reading(&mut found.scene.annotation_options, lenient, scenes);
+        return AreaInput::found(found, asked, opened);
+    }
+    if file.is_dir() {
+        file = file.join(SCENE);
+    }
+
+    let mut scene = s3d_io::scene::read_scene(&file)?;
+    set_reading(&mut scene.annotation_options, lenient, scenes);
+    if scene.parts.is_empty() {
+        return AreaInput::open(scene, asked, opened);
+    }
+    let scenes = scenes * scene.parts.len();
+    if opened.is_part {
+        return Err(Error::unfit(
+            &file,
+            "is a part of a scene, and has parts itself: name them in that scene",
+        ));
+    }
+    // Labels of the whole area replace those of its parts.
+    let annotations = opened.annotations && !scene.is_labelled;
+    let opened_part = Opened { annotations, keep_mesh: false, is_part: true };
+    AreaInput::of_parts(scene, asked, opened, |path| {
+        let mut source: SceneSource = path.into();
+        if let SceneSource::Path(path) = &mut source
+            && let Some(fused) = scene_of_raw(path)?
+        {
+            *path = fused;
+        }
+        open_area(&source, asked, lenient, scenes, opened_part)
+    })
 }
 
 /// Says how the annotations of one of several scenes are read.

@@ -70,7 +70,11 @@ pub(super) fn published_numbers(labels: &[Label], annotations: Annotations) -> V
     named(annotations, &names)
 }
 
-fn named(annotations: Annotations, labels: &BTreeMap<(Room, Class, u32), Label>) -> Vec<RoomInput> {
+/// Gives every instance of these annotations its label.
+pub(super) fn named(
+    annotations: Annotations,
+    labels: &BTreeMap<(Room, Class, u32), Label>,
+) -> Vec<RoomInput> {
     let mut rooms: Vec<RoomInput> = annotations
         .rooms
         .into_iter()

@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::export::input::masks::{check_mask_size, find_masks};
-use glam::DVec3;
+use glam::{DAffine3, DVec3};
 use rayon::prelude::*;
 use s3d_geom::{Camera, CameraError, PhotoLens, Pose, Raster};
 use s3d_io::Error as FileError;
@@ -28,16 +28,14 @@ const VIEW: Frame = Frame::View(0);
 /// An area's photographs.
 #[derive(Default)]
 pub(crate) struct Photographs {
-    /// The list that they come from, for messages.
-    pub(crate) list: PathBuf,
-    /// In the list's order.
+    /// In the order of their lists.
     pub(crate) all: Vec<Photograph>,
     /// What the log says of them, a sentence each.
     pub(crate) notes: Vec<String>,
     /// What was odd about them, a sentence each.
     pub(crate) warnings: Vec<String>,
-    /// The files of the list. The list may be a folder that holds much else.
-    list_files: Vec<PathBuf>,
+    /// The lists that they come from, each with its files. A list may be a folder that holds much else.
+    lists: Vec<(PathBuf, Vec<PathBuf>)>,
 }
 
 /// A photograph and its view.
@@ -177,7 +175,24 @@ impl Photographs {
         }
 
         let all = found.into_iter().map(|(photograph, _)| photograph).collect();
-        Ok(Self { list: list.clone(), all, notes, warnings, list_files: files })
+        Ok(Self { all, notes, warnings, lists: vec![(list.clone(), files)] })
+    }
+
+    /// Adds the photographs of another part of the area `area`, moved to the world of the scene. A name that
+    /// is taken gets the number of the part in front.
+    pub(super) fn append(&mut self, part: Self, scene_from_part: &DAffine3, area: u32, number: usize) {
+        let names: HashSet<String> = self.all.iter().map(|photograph| photograph.name.clone()).collect();
+        for mut photograph in part.all {
+            if names.contains(&photograph.name) {
+                photograph.name = format!("part_{number}/{}", photograph.name);
+            }
+            photograph.uuid = uuid_of(area, &photograph.name);
+            photograph.move_by(scene_from_part);
+            self.all.push(photograph);
+        }
+        self.notes.extend(part.notes);
+        self.warnings.extend(part.warnings);
+        self.lists.extend(part.lists);
     }
 
     /// Where they were taken, as a list of locations.
@@ -196,7 +211,8 @@ impl Photographs {
             .filter(|photograph| photograph.picture.part.is_none())
             .map(|photograph| &photograph.picture.path);
         let masks = self.all.iter().filter_map(|photograph| photograph.mask.as_ref());
-        self.list_files.iter().chain(pictures).chain(masks)
+        let of_lists = self.lists.iter().flat_map(|(_, files)| files);
+        of_lists.chain(pictures).chain(masks)
     }
 
     /// The same files by folder. A file of the list belongs to the list, whether that is a folder or a file;
@@ -204,15 +220,30 @@ impl Photographs {
     pub(crate) fn by_folder(&self) -> BTreeMap<PathBuf, Vec<PathBuf>> {
         let mut folders: BTreeMap<PathBuf, Vec<PathBuf>> = BTreeMap::new();
         for file in self.files() {
-            let folder = if file.starts_with(&self.list) {
-                self.list.as_path()
-            } else {
-                file.parent().unwrap_or(Path::new(""))
-            };
+            let list = self.lists.iter().find(|(list, _)| file.starts_with(list));
+            let folder = list.map_or(file.parent().unwrap_or(Path::new("")), |(list, _)| list);
             folders.entry(folder.to_owned()).or_default().push(file.clone());
         }
         folders
     }
+}
+
+impl Photograph {
+    fn move_by(&mut self, by: &DAffine3) {
+        let pose = &mut self.camera.pose;
+        *pose = match &mut self.taken {
+            Taken::Lens(_) => pose.moved(by),
+            Taken::Panorama { pose, .. } => {
+                *pose = pose.moved(by);
+                pose.leveled()
+            }
+        };
+    }
+}
+
+/// The uuid of the view of an area's photograph.
+fn uuid_of(area: u32, name: &str) -> String {
+    uuid_from_name(&format!("area_{area}/{name}"))
 }
 
 /// Takes one photograph of every `source.every`, and of these at most `source.max`, evenly spread.
@@ -357,14 +388,13 @@ fn open_one(
         .map_err(|e| camera_error(&source.path, posed, e.to_string()))?;
 
     let name = posed.name.clone();
-    let uuid = uuid_from_name(&format!("area_{area}/{name}"));
+    let uuid = uuid_of(area, &name);
     Ok((Photograph { name, uuid, picture, mask, taken, camera }, turn))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::DAffine3;
     use s3d_geom::Pose;
     use std::num::NonZeroU32;
 

@@ -6,7 +6,7 @@ use crate::export::input::cameras::Cameras;
 use crate::export::input::mesh::{MeshFrame, MeshSource};
 use crate::export::input::numbering::published_numbers;
 use crate::export::input::photographs::Photographs;
-use crate::export::input::scene::{Opened, files_of, photographs_of};
+use crate::export::input::scene::{Opened, files_of, photographs_of, pictures_of};
 use crate::options::placing::Placing;
 use crate::record::data_set::check_area;
 use glam::{DAffine3, DVec3};
@@ -83,7 +83,7 @@ impl AreaInput {
             source: MeshSource::Published(Box::new(area)),
             frame,
             mesh_file: opened.keep_mesh.then_some(file),
-            pictures: scene.and_then(|s| s.pictures),
+            pictures: pictures_of(scene.and_then(|s| s.pictures), &cameras, &frame),
             is_labelled,
             taxonomy,
             rooms,

@@ -1,7 +1,7 @@
 //! Opens an area of files: a scene file, or meshes alone.
 
 use crate::error::{Error, Result};
-use crate::export::input::area::AreaInput;
+use crate::export::input::area::{AreaInput, PictureSet};
 use crate::export::input::cameras::Cameras;
 use crate::export::input::colors::PointColors;
 use crate::export::input::mesh::{MeshFrame, MeshSource};
@@ -10,10 +10,10 @@ use crate::export::input::photographs::Photographs;
 use crate::mesh_axes::{self, MeshAxes, has_own_frame};
 use crate::options::placing::Placing;
 use crate::record::request::InputRecord;
-use glam::DVec3;
+use glam::{DAffine3, DVec3};
 use s3d_io::cloud::{AnnotatedMesh, AnnotationOptions, Annotations, OnFault};
 use s3d_io::mesh::{MeshFile, MeshOptions, MeshOrigin, ToldOffset, UpAxis};
-use s3d_io::scene::{CameraSource, FoundScene, MeshColors, SceneFile};
+use s3d_io::scene::{CameraSource, FoundScene, MeshColors, PictureSource, SceneFile};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -25,6 +25,8 @@ pub(super) struct Opened {
     /// Whether the mesh stays in memory. Several meshes are read again where they are needed, so that they
     /// never share the memory.
     pub(super) keep_mesh: bool,
+    /// Whether it is a part of another scene. If so, it has no parts itself.
+    pub(super) is_part: bool,
 }
 
 impl AreaInput {
@@ -55,10 +57,7 @@ impl AreaInput {
             let mut annotations =
                 frame.open_beside(|offset_m| open_annotations(&scene, &file, &frame, offset_m))?;
             warnings = std::mem::take(&mut annotations.warnings);
-            companions = std::mem::take(&mut annotations.companions);
-            // A file that lies in a folder of annotations is read with the folder.
-            companions.retain(|path| !scene.annotations.iter().any(|named| path.starts_with(named)));
-            companions.retain(|path| !scene.mesh.contains(path));
+            companions = companions_of(&scene, &mut annotations);
 
             if takes_colors && let MeshSource::Files { colors, .. } = &mut source {
                 let found = PointColors::of(&scene.path, &file.mesh, &annotations)?;
@@ -79,13 +78,7 @@ impl AreaInput {
         let mesh_file = opened.keep_mesh.then_some(file);
         let photographs = photographs_of(&scene, &frame)?;
 
-        let listed = frame.open_beside(|offset_m| {
-            let found = Cameras::of_scene(&scene, asked, offset_m)?;
-            if let Some((cameras, list)) = &found {
-                frame.refuse_far_locations(list, cameras.listed())?;
-            }
-            Ok(found)
-        })?;
+        let listed = cameras_of(&scene, asked, &frame)?;
         let (cameras, cameras_path) = listed.unwrap_or_else(|| {
             // An area with photographs needs no other locations.
             let cameras = if photographs.all.is_empty() {
@@ -113,7 +106,6 @@ impl AreaInput {
             is_labelled: scene.is_labelled,
             taxonomy: scene.taxonomy.clone(),
             rooms,
-            cameras,
             notes,
             warnings,
             lenient: scene.annotation_options.on_fault == OnFault::Skip,
@@ -131,7 +123,8 @@ impl AreaInput {
             records: Vec::new(),
             photographs,
             cameras_path,
-            pictures: scene.pictures,
+            pictures: pictures_of(scene.pictures, &cameras, &frame),
+            cameras,
             path: scene.path,
             found: None,
         })
@@ -195,7 +188,7 @@ fn mesh_source(scene: &SceneFile) -> MeshSource {
 }
 
 /// Opens the annotations of a scene file: its own, or the labels of its mesh.
-fn open_annotations(
+pub(super) fn open_annotations(
     scene: &SceneFile,
     file: &MeshFile,
     frame: &MeshFrame,
@@ -216,6 +209,30 @@ fn open_annotations(
     Ok(Annotations::open_for(&mesh, &scene.annotations, &options)?)
 }
 
+/// Takes the files that were read beside those that a scene file names.
+pub(super) fn companions_of(scene: &SceneFile, annotations: &mut Annotations) -> Vec<PathBuf> {
+    let mut companions = std::mem::take(&mut annotations.companions);
+    // A file that lies in a folder of annotations is read with the folder.
+    companions.retain(|path| !scene.annotations.iter().any(|named| path.starts_with(named)));
+    companions.retain(|path| !scene.mesh.contains(path));
+    companions
+}
+
+/// Returns the scan locations of a scene file, or how to place them, with the file that says so.
+pub(super) fn cameras_of(
+    scene: &SceneFile,
+    asked: Option<Placing>,
+    frame: &MeshFrame,
+) -> Result<Option<(Cameras, PathBuf)>> {
+    frame.open_beside(|offset_m| {
+        let found = Cameras::of_scene(scene, asked, offset_m)?;
+        if let Some((cameras, list)) = &found {
+            frame.refuse_far_locations(list, cameras.listed())?;
+        }
+        Ok(found)
+    })
+}
+
 /// Opens the photographs that a scene file names.
 pub(super) fn photographs_of(scene: &SceneFile, frame: &MeshFrame) -> Result<Photographs> {
     let Some(source) = &scene.frames else { return Ok(Photographs::default()) };
@@ -224,6 +241,18 @@ pub(super) fn photographs_of(scene: &SceneFile, frame: &MeshFrame) -> Result<Pho
         frame.refuse_far_locations(&source.path, &photographs.locations())?;
         Ok(photographs)
     })
+}
+
+/// Returns the pictures of a scene file, which are of all listed locations.
+pub(super) fn pictures_of(
+    source: Option<PictureSource>,
+    cameras: &Cameras,
+    frame: &MeshFrame,
+) -> Vec<PictureSet> {
+    let locations = 0..cameras.listed().len();
+    let (offset_m, scene_from_part) = (frame.offset_m, DAffine3::IDENTITY);
+    let of_all = |source| PictureSet { source, locations, offset_m, scene_from_part };
+    source.map(of_all).into_iter().collect()
 }
 
 /// Returns the offset that a program tells beside the mesh of a scene, which must not say another itself.

@@ -128,7 +128,7 @@ pub(crate) fn know_labels(area: &AreaInput, labelled: &LabelledArea, common: &Co
 
 /// Returns what looks wrong about an area's mesh alone.
 pub(crate) fn mesh_doubts(area: &AreaInput, mesh: &TriMesh, options: &ExportOptions) -> Result<Vec<Finding>> {
-    let makes_rgb = area.pictures.is_none() && options.modalities.contains(&Domain::Rgb);
+    let makes_rgb = area.pictures.is_empty() && options.modalities.contains(&Domain::Rgb);
     let mut findings = mesh_findings(mesh, makes_rgb);
     findings.extend(size_findings(mesh, options.points_per_m2)?);
     Ok(findings)
@@ -350,7 +350,7 @@ fn area_entry(area: &AreaInput, labelled: &LabelledArea, options: &ExportOptions
         views: 0,
         frames: area.photographs.all.len() as u64,
         xyz: XyzLoss::of(labelled.mesh_box, options.xyz),
-        rgb: area.pictures.as_ref().map_or("texture", |p| p.kind.name()).to_owned(),
+        rgb: area.rgb_source().to_owned(),
         place_cameras: area.cameras.distance_m(),
         see: area.cameras.share(),
         surface_seen: labelled.surface_seen,

@@ -10,7 +10,6 @@ mod owners;
 #[cfg(test)]
 mod tests;
 
-use crate::camera::locations::moved;
 use crate::camera::programs::e57::{E57File, open, rotation_of, scan_uuid};
 use crate::camera::table::FARTHEST_M;
 use crate::error::{Error, Result};
@@ -22,7 +21,7 @@ use lens::{Axes, lens_of, pose_of};
 pub use owners::E57Owners;
 use owners::Unused;
 use rayon::prelude::*;
-use s3d_geom::glam::{DAffine3, DVec3, dvec3};
+use s3d_geom::glam::{DAffine3, dvec3};
 use s3d_geom::{CaptureLens, Pose, Raster};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -113,10 +112,10 @@ impl E57Pictures {
         &self.path
     }
 
-    /// Moves the poses from the frame of the mesh's file to where the mesh lies.
-    pub fn subtract(&mut self, offset_m: DVec3) {
+    /// Moves all poses, such as from the frame of the mesh's file to where the mesh lies.
+    pub fn move_all(&mut self, by: &DAffine3) {
         for picture in &mut self.pictures {
-            picture.pose.location -= offset_m;
+            picture.pose = picture.pose.moved(by);
         }
     }
 
@@ -127,7 +126,7 @@ impl E57Pictures {
             let Some(motion) = motion else { continue };
             for number in numbers {
                 if let Some(picture) = self.pictures.get_mut(*number) {
-                    picture.pose = moved(&picture.pose, motion);
+                    picture.pose = picture.pose.moved(motion);
                 }
             }
         }
@@ -199,7 +198,7 @@ impl E57Picture {
         let transform = image.transform.ok_or("has no pose")?;
         let rotation = rotation_of(&transform.rotation).ok_or("has a pose without a rotation")?;
         let t = &transform.translation;
-        let pose = moved(&pose_of(dvec3(t.x, t.y, t.z), rotation, axes), world_from_file);
+        let pose = pose_of(dvec3(t.x, t.y, t.z), rotation, axes).moved(world_from_file);
         if !pose.location.is_finite() || pose.location.abs().max_element() > FARTHEST_M {
             return Err("has a pose more than 10,000 km from the origin");
         }

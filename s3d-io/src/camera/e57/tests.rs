@@ -195,7 +195,7 @@ fn the_frame_of_the_file_is_moved_with_the_picture() {
     let world_from_file =
         DAffine3::from_mat3_translation(DMat3::from_rotation_x(0.5 * PI), dvec3(10.0, 0.0, 3.0));
     let mut pictures = E57Pictures::open(&path, &world_from_file).unwrap();
-    pictures.subtract(dvec3(0.0, 1.0, 0.0));
+    pictures.move_all(&DAffine3::from_translation(dvec3(0.0, -1.0, 0.0)));
     let moved = pictures.read(&[0]).unwrap();
     let still = open(&path).read(&[0]).unwrap();
     let point = PLACE + turn() * dvec3(0.2, -0.3, -2.0);

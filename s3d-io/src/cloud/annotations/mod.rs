@@ -1,5 +1,6 @@
 //! Annotated points of any source: rooms, their instances, and the points of each instance.
 
+mod joined;
 mod of_faces;
 mod of_memory;
 
@@ -13,6 +14,7 @@ use std::fmt::Debug;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+pub use joined::PlacedInstance;
 #[cfg(feature = "labels")]
 pub(crate) use of_faces::push_middles;
 pub use of_memory::AnnotatedPoints;

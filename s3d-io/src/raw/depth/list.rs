@@ -1,7 +1,6 @@
 //! Makes the list of a scan's depth pictures from what a form's reader found: sizes, lenses, checks.
 
 use crate::camera::PosedCamera;
-use crate::camera::locations::moved;
 use crate::error::{Error, Result};
 use crate::raw::depth::confidence::Confidence;
 use crate::raw::depth::file::{DepthFile, DepthPlace};
@@ -131,13 +130,13 @@ impl Entry {
             let picture = camera.picture.clone()?;
             picture.path.is_file().then(|| ColorPicture {
                 picture,
-                pose: moved(&camera.pose, &options.world_from_file),
+                pose: camera.pose.moved(&options.world_from_file),
                 camera,
             })
         });
         Ok(DepthPicture {
             name: camera.name,
-            pose: moved(&camera.pose, &options.world_from_file),
+            pose: camera.pose.moved(&options.world_from_file),
             lens,
             confidence: confidence.filter(|confidence| confidence.path().is_file()),
             color,

@@ -1,6 +1,5 @@
 //! The scans of an E57 file: their places, grids, and what their points have. Source: ASTM E2807, "data3D".
 
-use crate::camera::locations::moved;
 use crate::camera::programs::e57::{open, rotation_of, scan_uuid};
 use crate::cloud::e57::grid::{grid_of, has_color_and_intensity};
 use crate::error::{Error, Result};
@@ -36,7 +35,7 @@ pub(super) fn list(path: &Path, options: &RawOptions) -> Result<Listed> {
             None => None,
         };
         without_pose += usize::from(pose.is_none());
-        let pose = pose.map(|pose| moved(&pose, &options.world_from_file));
+        let pose = pose.map(|pose| pose.moved(&options.world_from_file));
 
         let [has_colors, has_intensity] = has_color_and_intensity(cloud);
         let info = ScanInfo {

@@ -1,6 +1,5 @@
 //! The scans of a PTX file: their places and grids. Source: "Leica Cyclone: PTX and PTS file formats".
 
-use crate::camera::locations::moved;
 use crate::cloud::text::ptx::{Scan, list as list_scans};
 use crate::cloud::text::read::lines_from;
 use crate::error::{Error, Result};
@@ -63,7 +62,7 @@ pub(super) fn list(path: &Path, options: &RawOptions) -> Result<Listed> {
         let (origin, warning) = origin_of(&place.scan);
         warnings.extend(warning.map(|warning| format!("{}: {name}: {warning}", path.display())));
         let pose = rotation_of(&place.scan.pose.matrix3)
-            .map(|rotation| moved(&Pose::from_scanner(origin, rotation), &options.world_from_file));
+            .map(|rotation| Pose::from_scanner(origin, rotation).moved(&options.world_from_file));
 
         let grid = u32::try_from(rows).ok().zip(u32::try_from(columns).ok());
         let (bytes, lines) = place.before();

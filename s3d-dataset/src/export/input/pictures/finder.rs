@@ -1,14 +1,14 @@
 //! The pictures of each scan location: where they are, and whether they are as they should be.
 
 use crate::error::Result;
-use crate::export::input::area::AreaInput;
+use crate::export::input::area::PictureSet;
 use glam::{DAffine3, DVec3};
 use s3d_geom::Pose;
 use s3d_io::Error as FileError;
 use s3d_io::camera::{
     CaptureFile, E57Owners, E57Pictures, PictureFolder, ScanLocation, check_picture, read_cameras,
 };
-use s3d_io::scene::{PictureKind, PictureSource};
+use s3d_io::scene::PictureKind;
 use std::path::{Path, PathBuf};
 
 /// The pictures of a location.
@@ -33,17 +33,19 @@ pub(super) enum PictureFinder {
 }
 
 impl PictureFinder {
-    pub(super) fn open(source: &PictureSource, area: &AreaInput) -> Result<Self> {
+    /// Opens the pictures of `locations`, which the set is of.
+    pub(super) fn open(set: &PictureSet, locations: &[ScanLocation]) -> Result<Self> {
+        let source = &set.source;
         Ok(match source.kind {
             PictureKind::SkyBox => Self::SkyBox(PictureFolder::open(&source.path)?),
             PictureKind::Captures => Self::Captures(PictureFolder::open(&source.path)?),
             PictureKind::Panorama => Self::Panorama(PictureFolder::open(&source.path)?),
             PictureKind::E57 => {
                 let mut pictures = E57Pictures::open(&source.path, &source.world_from_file)?;
-                pictures.subtract(area.frame.offset_m);
-                let owners = pictures.of_locations(area.cameras.listed());
+                pictures.move_all(&set.mesh_from_poses());
+                let owners = pictures.of_locations(locations);
                 if let Some(table) = &source.motions {
-                    let motions = motions(table, area.cameras.listed())?;
+                    let motions = motions(table, locations, &set.scene_from_part)?;
                     pictures.move_pictures(&owners, &motions);
                 }
                 Self::E57 { pictures, owners }
@@ -113,26 +115,32 @@ impl PictureFinder {
     }
 }
 
-/// Returns the motion of each location that a table names.
-fn motions(table: &Path, locations: &[ScanLocation]) -> Result<Vec<Option<DAffine3>>> {
+/// Returns the motion of each location that a table names, in the world of the scene.
+fn motions(
+    table: &Path,
+    locations: &[ScanLocation],
+    scene_from_part: &DAffine3,
+) -> Result<Vec<Option<DAffine3>>> {
     let listed = read_cameras(table)?;
     // A table of locations holds the rotations of scanners.
     let still = Pose::level(DVec3::ZERO, 0.0).world_from_camera.transpose();
+    let part_from_scene = scene_from_part.inverse();
     let motion = |of: &ScanLocation| {
         let turn = of.pose.world_from_camera * still;
-        DAffine3 { matrix3: turn, translation: of.pose.location }
+        let in_part = DAffine3 { matrix3: turn, translation: of.pose.location };
+        *scene_from_part * in_part * part_from_scene
     };
     let of = |location: &ScanLocation| listed.iter().find(|moved| moved.uuid == location.uuid).map(motion);
     Ok(locations.iter().map(of).collect())
 }
 
 impl LocationPictures {
-    /// Moves the poses of captures from the frame of the mesh's file to where the mesh lies.
-    pub(super) fn subtract(&mut self, offset_m: DVec3) {
+    /// Moves the poses of captures.
+    pub(super) fn move_captures(&mut self, by: &DAffine3) {
         if let Self::Captures(captures) = self {
             captures
                 .iter_mut()
-                .for_each(|capture| capture.pose.location -= offset_m);
+                .for_each(|capture| capture.pose = capture.pose.moved(by));
         }
     }
 }

@@ -5,7 +5,7 @@ mod finder;
 
 use crate::context::Context;
 use crate::error::Result;
-use crate::export::input::area::AreaInput;
+use crate::export::input::area::{AreaInput, PictureSet};
 use crate::export::input::cameras::Cameras;
 use crate::export::picture_colors::PictureColors;
 use finder::{LocationPictures, PictureFinder, check_sky_box};
@@ -22,13 +22,19 @@ const MAX_NAMED: usize = 20;
 
 /// An area's pictures.
 pub(crate) struct Pictures {
+    sets: Vec<OpenSet>,
+    /// The pictures of each location, and the number of their set; `None` where no image is asked for, or no
+    /// set is of the location.
+    found: Vec<Option<(usize, LocationPictures)>>,
+    /// What was odd about them, as a sentence each.
+    pub(crate) warnings: Vec<String>,
+}
+
+/// The pictures of some locations.
+struct OpenSet {
     source: PictureSource,
     /// The file of the pictures, if they are in one.
     e57: Option<E57Pictures>,
-    /// The pictures of each location; `None` where no image is asked for.
-    found: Vec<Option<LocationPictures>>,
-    /// What was odd about them, as a sentence each.
-    pub(crate) warnings: Vec<String>,
 }
 
 impl Pictures {
@@ -38,88 +44,44 @@ impl Pictures {
     /// # Errors
     /// If pictures are missing, with all of them; for the first picture that is not as it should be.
     pub(crate) fn open(area: &AreaInput, is_asked: impl Fn(&ScanLocation) -> bool) -> Result<Option<Self>> {
-        let Some(source) = &area.pictures else { return Ok(None) };
+        let Some(first) = area.pictures.first() else { return Ok(None) };
         if matches!(area.cameras, Cameras::Placed(_)) {
             return Err(FileError::format(
                 &area.path,
                 format!(
                     "takes colours from {} pictures, but its scan locations are placed where none was taken: \
                      give it the locations of the pictures, or rgb = \"texture\"",
-                    source.kind
+                    first.source.kind
                 ),
             )
             .into());
         }
 
-        let finder = PictureFinder::open(source, area)?;
-        let mut found = Vec::new();
-        let mut missing = Vec::new();
-        let mut warnings = finder.warnings();
-
-        for (index, location) in area.cameras.listed().iter().enumerate() {
-            let uuid = &location.uuid;
-            let of_location = if is_asked(location) {
-                Some(finder.find(index, uuid)?)
-            } else {
-                None
-            };
-
-            found.push(match of_location {
-                Some(Ok(mut pictures)) => {
-                    finder.check(&pictures)?;
-                    pictures.subtract(area.frame.offset_m);
-                    if let LocationPictures::Captures(captures) = &pictures
-                        && captures.len() < CAPTURES_A_LOCATION
-                    {
-                        warnings.push(format!(
-                            "location {uuid} has {} captures of {CAPTURES_A_LOCATION}: what none sees is \
-                             taken from elsewhere",
-                            captures.len()
-                        ));
-                    }
-                    Some(pictures)
-                }
-                Some(Err(names)) => {
-                    missing.push(names);
-                    None
-                }
-                None => None,
-            });
+        let listed = area.cameras.listed();
+        let mut found: Vec<Option<(usize, LocationPictures)>> = listed.iter().map(|_| None).collect();
+        let (mut sets, mut warnings) = (Vec::new(), Vec::new());
+        for set in &area.pictures {
+            let locations = &listed[set.locations.clone()];
+            let (e57, of_set) = open_set(area, set, locations, &is_asked, &mut warnings)?;
+            let of_set = of_set.into_iter().map(|found| found.map(|found| (sets.len(), found)));
+            found.splice(set.locations.clone(), of_set);
+            sets.push(OpenSet { source: set.source.clone(), e57 });
         }
-
-        if !missing.is_empty() {
-            let count = missing.len();
-            let of = area.cameras.listed().len();
-            let more = count.saturating_sub(MAX_NAMED);
-            missing.truncate(MAX_NAMED);
-            let mut names = missing.join("; ");
-            if more > 0 {
-                names += &format!("; and those of {more} more");
-            }
-
-            let mut message = format!(
-                "pictures of {count} of {of} locations are missing (rgb = \"{}\" in {}): {names}",
-                source.kind,
-                area.path.display()
-            );
-            // A picture that is of no location may be one of the missing.
-            for warning in finder.warnings() {
-                message += &format!("; {warning}");
-            }
-            return Err(FileError::format(&source.path, message).into());
-        }
-
-        Ok(Some(Self { source: source.clone(), e57: finder.into_e57(), found, warnings }))
+        Ok(Some(Self { sets, found, warnings }))
     }
 
     /// Describes the pictures in a line.
     pub(crate) fn summary(&self) -> String {
-        let locations = self.found.iter().flatten().count();
-        let kind = match self.source.kind {
-            PictureKind::E57 => "images",
-            kind => kind.name(),
+        let of_set = |(number, set): (usize, &OpenSet)| {
+            let locations = self.found.iter().flatten().filter(|(of, _)| *of == number).count();
+            let kind = match set.source.kind {
+                PictureKind::E57 => "images",
+                kind => kind.name(),
+            };
+            format!("{kind} of {locations} locations in {}", set.source.path.display())
         };
-        format!("{kind} of {locations} locations in {}", self.source.path.display())
+        let sets: Vec<String> = self.sets.iter().enumerate().map(of_set).collect();
+        sets.join(", ")
     }
 
     /// Makes a location's cube map, on all threads. Returns `None` if no image of the location is asked for.
@@ -130,9 +92,10 @@ impl Pictures {
         location: &ScanLocation,
         scene: &Scene<'_>,
     ) -> Result<Option<CubeMap>> {
-        let Some(found) = &self.found[index] else { return Ok(None) };
+        let Some((set, found)) = &self.found[index] else { return Ok(None) };
+        let OpenSet { source, e57 } = &self.sets[*set];
         let started = Instant::now();
-        let options = &self.source.options;
+        let options = &source.options;
         let pose = &location.pose;
 
         let cube = match found {
@@ -169,7 +132,7 @@ impl Pictures {
                 stitch(captures, pose, scene, &StitchOptions { size: options.size, gains: options.gains })
             }
             LocationPictures::E57(numbers) => {
-                let Some(pictures) = &self.e57 else { return Ok(None) };
+                let Some(pictures) = e57 else { return Ok(None) };
                 let shots = pictures.read(numbers)?;
                 let captures = shots.into_iter().map(capture_of_shot).collect();
                 let scene = options.parallax.then_some(scene);
@@ -188,10 +151,83 @@ impl Pictures {
         Ok(Some(cube))
     }
 
-    /// The colours that a cube map gives.
-    pub(crate) fn colors<'a>(&self, cube: &'a CubeMap) -> PictureColors<'a> {
-        PictureColors::Cube { cube, unseen: self.source.options.unseen }
+    /// The colours that the cube map of a location gives.
+    pub(crate) fn colors<'a>(&self, index: usize, cube: &'a CubeMap) -> Option<PictureColors<'a>> {
+        let (set, _) = self.found[index].as_ref()?;
+        Some(PictureColors::Cube { cube, unseen: self.sets[*set].source.options.unseen })
     }
+}
+
+/// The pictures of each location of a set.
+type Found = Vec<Option<LocationPictures>>;
+
+/// Finds the pictures of the locations that a set is of, with the file that they are in, if there is one.
+fn open_set(
+    area: &AreaInput,
+    set: &PictureSet,
+    locations: &[ScanLocation],
+    is_asked: &impl Fn(&ScanLocation) -> bool,
+    warnings: &mut Vec<String>,
+) -> Result<(Option<E57Pictures>, Found)> {
+    let finder = PictureFinder::open(set, locations)?;
+    let mut found = Vec::new();
+    let mut missing = Vec::new();
+    warnings.extend(finder.warnings());
+
+    for (index, location) in locations.iter().enumerate() {
+        let uuid = &location.uuid;
+        let of_location = if is_asked(location) {
+            Some(finder.find(index, uuid)?)
+        } else {
+            None
+        };
+
+        found.push(match of_location {
+            Some(Ok(mut pictures)) => {
+                finder.check(&pictures)?;
+                pictures.move_captures(&set.mesh_from_poses());
+                if let LocationPictures::Captures(captures) = &pictures
+                    && captures.len() < CAPTURES_A_LOCATION
+                {
+                    warnings.push(format!(
+                        "location {uuid} has {} captures of {CAPTURES_A_LOCATION}: what none sees is taken \
+                         from elsewhere",
+                        captures.len()
+                    ));
+                }
+                Some(pictures)
+            }
+            Some(Err(names)) => {
+                missing.push(names);
+                None
+            }
+            None => None,
+        });
+    }
+
+    if !missing.is_empty() {
+        let count = missing.len();
+        let of = locations.len();
+        let more = count.saturating_sub(MAX_NAMED);
+        missing.truncate(MAX_NAMED);
+        let mut names = missing.join("; ");
+        if more > 0 {
+            names += &format!("; and those of {more} more");
+        }
+
+        let source = &set.source;
+        let mut message = format!(
+            "pictures of {count} of {of} locations are missing (rgb = \"{}\" in {}): {names}",
+            source.kind,
+            area.path.display()
+        );
+        // A picture that is of no location may be one of the missing.
+        for warning in finder.warnings() {
+            message += &format!("; {warning}");
+        }
+        return Err(FileError::format(&source.path, message).into());
+    }
+    Ok((finder.into_e57(), found))
 }
 
 /// Does `work` on all items in parallel. The results are in the items' order.
