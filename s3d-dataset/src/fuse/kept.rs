@@ -87,8 +87,8 @@ fn list(path: &Path, files: &mut Vec<PathBuf>) -> Result<()> {
 }
 
 /// Returns the scene file of what `path` names, if it is fused from a raw scan; the mesh is made if it is not
-/// there yet, or if the raw scan has changed. Returns `None` for a scene of another kind. The parts of a scene
-/// file are made likewise.
+/// there yet, or if the raw scan has changed. Returns `None` for a scene of another kind. The parts of a
+/// scene file are made likewise.
 ///
 /// # Errors
 /// Those of [`fuse_folder`].

@@ -123,8 +123,8 @@ struct MeshTable {
 /// transform = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
 /// ```
 ///
-/// An area that was scanned in parts is joined from their scenes. `[cameras]` and `[annotations]` of the whole
-/// area may be given beside them:
+/// An area that was scanned in parts is joined from their scenes. `[cameras]` and `[annotations]` of the
+/// whole area may be given beside them:
 ///
 /// ```toml
 /// area = 5

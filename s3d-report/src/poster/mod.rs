@@ -255,13 +255,12 @@ struct Fronts {
 impl Fronts {
     /// Returns `None` if all faces show their backs.
     fn new(mesh: &TriMesh, eye: DVec3) -> Option<Self> {
-        let is_front = |face: &u32| {
+        let is_front = |(face, _): &(u32, [u32; 3])| {
             let to_face = mesh.triangle(*face)[0].as_dvec3() - eye;
             mesh.normal(*face).as_dvec3().dot(to_face) < 0.0
         };
-        let all = 0..mesh.faces().len() as u32;
-        let faces: Vec<u32> = all.into_par_iter().filter(is_front).collect();
-        let corners = faces.iter().map(|face| mesh.faces()[*face as usize]).collect();
+        let all = (0..).zip(mesh.faces().iter().copied());
+        let (faces, corners) = all.filter(is_front).unzip();
         let mesh = TriMesh::from_faces(mesh.positions().to_vec(), corners).ok()?;
         Some(Self { mesh, faces })
     }
@@ -289,7 +288,8 @@ fn first_faces(
     let face = |(hit, direction): (Option<Hit>, &DVec3)| {
         // A ray that does not go down stays above the section.
         let is_below = above == 0.0 || direction.z < 0.0;
-        hit.filter(|_| is_below).map(|hit| faces[hit.face as usize])
+        hit.filter(|_| is_below)
+            .and_then(|hit| faces.get(hit.face as usize).copied())
     };
     hits.into_iter().zip(directions).map(face).collect()
 }

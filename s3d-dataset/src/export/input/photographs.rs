@@ -293,7 +293,7 @@ fn find(source: &FrameSource, cameras: &[PosedCamera]) -> Result<Vec<PictureFile
 
         if candidates.is_empty() && source.images.is_none() {
             let message =
-                "no photograph was found for it: say which folder they are in, images = \"…\" under [frames]";
+                "no photograph was found for it: say which folder they are in: images = \"…\" in [frames]";
             return Err(camera_error(&source.path, camera, message.into()));
         }
 

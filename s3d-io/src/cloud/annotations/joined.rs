@@ -196,7 +196,7 @@ mod tests {
     /// The blocks of an instance: their numbers of points, and the faces of these.
     fn blocks(instance: &AnnotatedInstance) -> Vec<(usize, Vec<u32>)> {
         let mut blocks = Vec::new();
-        let mut reader = InstanceReader::new(1);
+        let mut reader = InstanceReader::new(2);
         let mut all = Vec::new();
         let (mut passes, _) = reader
             .read(instance, None, |block, _| {

@@ -173,8 +173,8 @@ fn join(
         None => (join_cameras(&scene, &mut parts, &labels.new_rooms, &mut pictures)?, scene.path.clone()),
     };
     if pictures.is_empty() && parts.iter().any(|part| !part.area.pictures.is_empty()) {
-        let why = "its scan locations are other places than the pictures of its parts were taken at: take the \
-                   parts' own locations, or leave out rgb there";
+        let why = "its scan locations are other places than the pictures of its parts were taken at: take \
+                   the locations of the parts, or leave out rgb there";
         return Err(Error::unfit(&scene.path, why));
     }
 

@@ -85,7 +85,12 @@ pub(super) fn join_rooms(area: u32, parts: Vec<PartRooms>, keep_names: bool) -> 
             match partner {
                 Some(at) => {
                     let other: &mut Joined = &mut joined[at];
-                    notes.push(format!("{path}: {name} is {} of the parts before it", other.room));
+                    let known = if other.room == name {
+                        "is also in the parts before it".to_owned()
+                    } else {
+                        format!("is {} of the parts before it", other.room)
+                    };
+                    notes.push(format!("{path}: {name} {known}"));
                     renamed.insert(name, other.room);
                     other.take(room, keep_names);
                 }
