@@ -15,8 +15,8 @@ use std::path::Path;
 use zip::ZipWriter;
 use zip::write::SimpleFileOptions;
 
-/// Returns the bytes that numpy writes for an array of H × W × C. `order` has the axes of the array (`"cyx"`
-/// for C × H × W), which is `fortran` or not.
+/// Returns the bytes that numpy writes for an array of H × W × C. `order` has the axes of the array
+/// (`"cyx"` for C × H × W), which is `fortran` or not.
 pub(crate) fn npy<const N: usize>(
     kind: &str,
     [height, width, channels]: [usize; 3],

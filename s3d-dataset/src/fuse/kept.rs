@@ -128,8 +128,12 @@ fn scene_file(path: &Path) -> Option<PathBuf> {
     (is_toml && file.is_file()).then_some(file)
 }
 
-/// Returns the scene file that [`fused_scene`] has made of what `path` names, if that is a raw scan itself.
+/// Returns the scene file that [`fused_scene`] has made of what `path` names, if that is a raw scan itself. A
+/// scene file in the folder of a raw scan goes before.
 pub(crate) fn scene_of_raw(path: &Path) -> Result<Option<PathBuf>> {
+    if scene_file(path).is_some() {
+        return Ok(None);
+    }
     Ok(raw_folder(path)?.map(|folder| folder.join(SCENE)))
 }
 

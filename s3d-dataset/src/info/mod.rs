@@ -159,7 +159,7 @@ pub fn info(scene: impl Into<SceneSource>, options: &InfoOptions, ctx: &Context)
     // What looks wrong before anything is surveyed.
     let mut doubts: Vec<String> = area.doubts(&file).cloned().collect();
     let pictures = picture_summary(area, &mut doubts);
-    let mut findings = mesh_findings(mesh, area.pictures.is_empty());
+    let mut findings = mesh_findings(mesh, area.shows_mesh_colors());
     findings.extend(size_findings(mesh, defaults.points_per_m2)?);
 
     let scene = Scene::new(mesh);

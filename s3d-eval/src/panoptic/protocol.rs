@@ -25,8 +25,8 @@ const DEFINITION: [&str; 5] = [
      segment that are void in the truth do not count in the union.",
     "A true segment without a match is missed. A predicted segment without a match is invented, unless more \
      than half of its pixels are void in the truth.",
-    "SQ is the mean IoU of matched segments; RQ = matched / (matched + invented / 2 + missed / 2); PQ = SQ · \
-     RQ. Each is a share of 1, over the segments of all images.",
+    "SQ is the mean IoU of matched segments; RQ = matched / (matched + invented / 2 + missed / 2); PQ = SQ \
+     · RQ. Each is a share of 1, over the segments of all images.",
     "A class without segments on either side has no scores and is left out of means.",
     "As in panopticapi 7bb4655 (panopticapi/evaluation.py), which prints 0 for such classes.",
 ];

@@ -162,6 +162,12 @@ impl AreaInput {
         self.source.published_labels()
     }
 
+    /// Whether images of some location have the mesh's own colours.
+    pub(crate) fn shows_mesh_colors(&self) -> bool {
+        let pictured: usize = self.pictures.iter().map(|set| set.locations.len()).sum();
+        self.pictures.is_empty() || pictured < self.cameras.listed().len()
+    }
+
     /// The words for the source of colours in the record of a data set.
     pub(crate) fn rgb_source(&self) -> &'static str {
         self.pictures.first().map_or("texture", |set| set.source.kind.name())

@@ -163,16 +163,16 @@ fn open_area(
     if scene.parts.is_empty() {
         return AreaInput::open(scene, asked, opened);
     }
-    let scenes = scenes * scene.parts.len();
     if opened.is_part {
         return Err(Error::unfit(
             &file,
             "is a part of a scene, and has parts itself: name them in that scene",
         ));
     }
+    let scenes = scenes * scene.parts.len();
     // Labels of the whole area replace those of its parts.
     let annotations = opened.annotations && !scene.is_labelled;
-    let opened_part = Opened { annotations, keep_mesh: false, is_part: true };
+    let opened_part = Opened { annotations, keep_mesh: true, is_part: true };
     AreaInput::of_parts(scene, asked, opened, |path| {
         let mut source: SceneSource = path.into();
         if let SceneSource::Path(path) = &mut source

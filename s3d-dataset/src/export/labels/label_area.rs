@@ -128,7 +128,7 @@ pub(crate) fn know_labels(area: &AreaInput, labelled: &LabelledArea, common: &Co
 
 /// Returns what looks wrong about an area's mesh alone.
 pub(crate) fn mesh_doubts(area: &AreaInput, mesh: &TriMesh, options: &ExportOptions) -> Result<Vec<Finding>> {
-    let makes_rgb = area.pictures.is_empty() && options.modalities.contains(&Domain::Rgb);
+    let makes_rgb = area.shows_mesh_colors() && options.modalities.contains(&Domain::Rgb);
     let mut findings = mesh_findings(mesh, makes_rgb);
     findings.extend(size_findings(mesh, options.points_per_m2)?);
     Ok(findings)

@@ -323,7 +323,8 @@ mod tests {
     use super::*;
     use s3d_geom::glam::dvec3;
 
-    /// A chunk with sensors of three types. Its world is twice as large, turned by 90° around +Z and shifted.
+    /// A chunk with sensors of three types. Its world is twice as large, turned by 90° around +Z, and
+    /// shifted.
     const CHUNK: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
 <document version="2.0.0">
   <chunk label="Chunk 1" enabled="true">

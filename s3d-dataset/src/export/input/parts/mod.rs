@@ -38,7 +38,7 @@ impl AreaInput {
         let mut parts = Vec::new();
         for source in &scene.parts {
             let mut part = open(&source.path)?;
-            let file = Arc::unwrap_or_clone(part.read_mesh()?);
+            let file = part.take_mesh()?;
             let first_offset_m = parts
                 .first()
                 .map_or(part.frame.offset_m, |p: &Part| p.area.frame.offset_m);

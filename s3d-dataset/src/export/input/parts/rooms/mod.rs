@@ -70,15 +70,10 @@ pub(super) fn join_rooms(area: u32, parts: Vec<PartRooms>, keep_names: bool) -> 
         let rooms = opened(part, keep_names || has_one)?;
         let mut renamed = BTreeMap::new();
         let partner = partners(&rooms, &joined, |room, other| room.likeness(other, keep_names));
-        let mut taken: BTreeSet<Room> = joined.iter().map(|room| room.room).collect();
-        taken.extend(
-            rooms
-                .iter()
-                .zip(&partner)
-                .filter(|(_, p)| p.is_none())
-                .map(|(room, _)| room.room),
-        );
-        let before = joined.iter().map(|room| room.room).collect::<BTreeSet<_>>();
+        let before: BTreeSet<Room> = joined.iter().map(|room| room.room).collect();
+        let mut taken = before.clone();
+        let alone = rooms.iter().zip(&partner).filter(|(_, partner)| partner.is_none());
+        taken.extend(alone.map(|(room, _)| room.room));
 
         for (mut room, partner) in rooms.into_iter().zip(partner) {
             let name = room.room;
