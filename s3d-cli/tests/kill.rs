@@ -121,6 +121,22 @@ impl Scene {
         // It may have finished at that moment.
         !child.wait().unwrap().success()
     }
+
+    /// Kills an export as soon as a file of its folder is there. It begins from what `prepare` makes, again if
+    /// it finished first.
+    fn kill_when_there(&self, out: &Path, more: &[&str], name: &str, prepare: impl Fn()) {
+        loop {
+            prepare();
+            let mut child = self.start(out, more);
+            while !out.join(name).exists() && child.try_wait().unwrap().is_none() {
+                thread::sleep(Duration::from_millis(1));
+            }
+            child.kill().unwrap();
+            if !child.wait().unwrap().success() {
+                return;
+            }
+        }
+    }
 }
 
 /// OUT holds these files, and nothing else.
@@ -292,9 +308,9 @@ fn every_journal_may_be_torn_anywhere() {
 fn other_arguments_are_refused_with_what_differs() {
     let scene = Scene::new();
     let out = scene.out("other");
-    while !scene.run_for(&out, &[], scene.took.mul_f64(0.6)) || !out.join(".s3d/request.json").exists() {
+    scene.kill_when_there(&out, &[], ".s3d/journal", || {
         let _ = fs::remove_dir_all(&out);
-    }
+    });
     let before = files(&out);
     s3d_fails(
         &scene.args(&out, &["--seed", "7"]),
@@ -413,12 +429,12 @@ fn a_killed_replacement_goes_on_or_gives_way_to_another() {
 fn a_replacement_that_fails_for_good_gives_the_earlier_one_back() {
     let scene = Scene::new();
     let out = scene.out("back");
-    s3d_ok(&scene.args(&out, &[]));
     let seven = ["--seed", "7", "--overwrite"];
-    // Half of the new data set, and the earlier one moved aside.
-    while !scene.run_for(&out, &seven, scene.took.mul_f64(0.6)) || !out.join(".s3d-previous").exists() {
+    // A part of the new data set, and the earlier one moved aside.
+    scene.kill_when_there(&out, &seven, ".s3d/journal", || {
         s3d_ok(&scene.args(&out, &["--overwrite"]));
-    }
+    });
+    assert!(out.join(".s3d-previous").exists());
     // A folder in place of a file, which then cannot be written.
     let blocked = out.join("area_2/3d/rgb.obj/in/the/way");
     let _ = fs::remove_file(out.join("area_2/3d/rgb.obj"));

@@ -32,6 +32,27 @@ fn drawn(out: &Path, to: &Path, options: &FiguresOptions) -> Value {
     serde_json::from_slice(&fs::read(to.join("figures.json")).unwrap()).unwrap()
 }
 
+#[test]
+fn pictures_have_as_many_pixels_an_inch_as_asked_for() {
+    let dir = tempfile::tempdir().unwrap();
+    let ([out, usual], few) = (labelled(), dir.path().join("few"));
+    drawn(&out, &few, &FiguresOptions { dpi: 72, ..FiguresOptions::default() });
+    let bytes = |folder: &Path, name: &str| fs::metadata(folder.join(format!("{name}.pdf"))).unwrap().len();
+    for name in ALL {
+        let [small, large] = [&few, &usual].map(|folder| png(folder, name));
+        assert_eq!([small.width(), large.width()], [504, 2100], "{name}");
+        let shapes = [&small, &large].map(|of| f64::from(of.height()) / f64::from(of.width()));
+        assert!((shapes[0] - shapes[1]).abs() < 0.05, "{name}: {shapes:?}");
+    }
+    assert!(bytes(&few, "area_1") < bytes(&usual, "area_1") / 4);
+    let means = [&few, &usual].map(|folder| {
+        let pixels = png(folder, "area_1");
+        let sum: f64 = pixels.pixels().iter().flatten().map(|c| f64::from(*c)).sum();
+        sum / pixels.pixels().len() as f64 / 3.0
+    });
+    assert!((means[0] - means[1]).abs() < 12.0, "the same picture: {means:?}");
+}
+
 fn png(folder: &Path, name: &str) -> Raster<[u8; 3]> {
     let path = folder.join(format!("{name}.png"));
     decode_rgb8(&fs::read(&path).unwrap(), &path).unwrap()
@@ -99,7 +120,11 @@ fn detections_are_drawn_beside_the_true_boxes() {
 
     let list = dir.path().join("found.json");
     let draw = |list: &Path, to: &str| {
-        let options = FiguresOptions { detections: Some(list.to_owned()), overwrite: true };
+        let options = FiguresOptions {
+            detections: Some(list.to_owned()),
+            overwrite: true,
+            ..FiguresOptions::default()
+        };
         figures(&out, &dir.path().join(to), &options, &Context::default())
     };
     fs::write(&list, serde_json::to_vec(&found).unwrap()).unwrap();

@@ -64,7 +64,7 @@ const READERS: [&[&str]; 16] = [
     &["xyz", "OUT", "--overwrite", "--type", "float"],
     &["pairs", "OUT", "--samples", "64"],
     &["refine", "OUT"],
-    &["figures", "OUT"],
+    &["figures", "OUT", "--dpi", "30"],
     &["profile", "OUT", "--to", "pointcept"],
     &["profile", "OUT", "--to", "open3d-ml"],
     &["profile", "OUT", "--to", "mmdet3d"],

@@ -5,37 +5,42 @@ use super::{Book, Drawn};
 use crate::error::Result;
 use crate::faults::Faults;
 use crate::index::RoomEntry;
-use crate::poster::{Colors, camera_of, class_colors, picture, rooms_of, section};
+use crate::poster::{Drawing, camera_of, class_colors, drawing, rooms_of, section};
 use s3d_geom::glam::DVec3;
-use s3d_geom::{Raster, TriMesh};
+use s3d_geom::{Camera, Raster, TriMesh};
 use std::collections::BTreeSet;
 
 pub(super) const GAP: f32 = 6.0;
-/// The pixels that a mesh is drawn in, before what is white around it is cut off.
+/// The pixels that a mesh is drawn in, before what is white around it is cut off, at 300 an inch.
 const PIXELS: [u32; 2] = [1600, 1000];
 /// White around a mesh, pixels.
 const MARGIN: u32 = 8;
 pub(super) const WHITE: [u8; 3] = [255; 3];
 
 /// A mesh seen from above, below its ceilings.
-pub(super) struct Above<'a> {
-    mesh: &'a TriMesh,
-    /// The height below which it is shown.
-    high: f64,
-    /// The columns and rows of [`PIXELS`] that are not white: the first ones and their number.
+pub(super) struct Above {
+    camera: Camera,
+    /// The pixels of the whole picture.
+    size: [u32; 2],
+    /// Its columns and rows that are not white: the first ones and their number.
     part: [[u32; 2]; 2],
 }
 
-impl<'a> Above<'a> {
-    /// Returns the view, and the mesh in its own colours.
-    pub(super) fn new(mesh: &'a TriMesh, rooms: &[RoomEntry]) -> (Self, Picture) {
+impl Above {
+    /// Returns the view, and the mesh in its own colours and in those of the faces' classes.
+    pub(super) fn new(
+        book: &Book<'_>,
+        mesh: &TriMesh,
+        rooms: &[RoomEntry],
+        classes: Option<&[[u8; 3]]>,
+    ) -> (Self, Picture, Option<Picture>) {
         let high = section(mesh, &rooms.iter().collect::<Vec<_>>());
-        let [width, height] = PIXELS;
-        let whole = Self { mesh, high, part: [[0, 0], [width, height]] };
-        let own = whole.picture(Colors::Own);
+        let size = PIXELS.map(|side| (side * book.dpi).div_ceil(300));
+        let Drawing { own, classes } = drawing(mesh, classes, high, size, WHITE);
 
+        let [width, height] = size;
         let ([mut x0, mut x1], [mut y0, mut y1]) = ([width, 0], [height, 0]);
-        for (y, row) in (0..).zip(own.pixels.rows()) {
+        for (y, row) in (0..).zip(own.rows()) {
             for (x, _) in (0..).zip(row).filter(|(_, pixel)| **pixel != WHITE) {
                 (x0, x1) = (x0.min(x), x1.max(x));
                 (y0, y1) = (y0.min(y), y1.max(y));
@@ -45,23 +50,18 @@ impl<'a> Above<'a> {
         let part = if x1 > x0 && y1 > y0 {
             [[x0, y0], [width.min(x1 + MARGIN) - x0, height.min(y1 + MARGIN) - y0]]
         } else {
-            whole.part
+            [[0, 0], size]
         };
-        let view = Self { part, ..whole };
-        let pixels = view.cut(&own.pixels);
-        (view, Picture { pixels, is_photo: true })
+        let view = Self { camera: camera_of(mesh, high, size), size, part };
+        let cut = |drawn: &Raster<[u8; 3]>| Picture { pixels: view.cut(drawn), is_photo: true };
+        let pictures = (cut(&own), classes.as_ref().map(cut));
+        (view, pictures.0, pictures.1)
     }
 
     /// Its height for each unit of its width.
     pub(super) fn aspect(&self) -> f32 {
         let [_, [w, h]] = self.part;
         h as f32 / w as f32
-    }
-
-    /// Draws the mesh.
-    pub(super) fn picture(&self, colors: Colors<'_>) -> Picture {
-        let drawn = picture(self.mesh, colors, self.high, PIXELS, WHITE.map(f32::from));
-        Picture { pixels: self.cut(&drawn), is_photo: true }
     }
 
     fn cut(&self, drawn: &Raster<[u8; 3]>) -> Raster<[u8; 3]> {
@@ -73,9 +73,9 @@ impl<'a> Above<'a> {
 
     /// Returns where points of the world are on a picture of this width that begins at a place.
     pub(super) fn project(&self, [left, top]: Point, width: f32) -> impl Fn(DVec3) -> Option<Point> + use<> {
-        let camera = camera_of(self.mesh, self.high, PIXELS);
+        let camera = self.camera;
         let [[x0, y0], [w, _]] = self.part;
-        let pixel = f64::from(PIXELS[0]) / f64::from(camera.width);
+        let pixel = f64::from(self.size[0]) / f64::from(camera.width);
         let scale = f64::from(width) / f64::from(w);
         move |point| {
             let (at, _) = camera.project(point)?;
@@ -92,15 +92,12 @@ pub(super) fn area(book: &Book<'_>, area: u32) -> Result<Option<Drawn>> {
     let mut faults = Faults::default();
     let rooms = rooms_of(book.data, area, &mut faults)?;
     let classes = class_colors(book.data, area, &mut faults)?;
-    let (above, own) = Above::new(&file.mesh, &rooms);
+    let (above, own, semantic) = Above::new(book, &file.mesh, &rooms, classes.as_deref());
 
     let legend = Legend::of(book, classes.iter().flatten().copied());
     let width = 0.5 * (WIDTH - GAP);
     let height = width * above.aspect();
     let mut sheet = Sheet::new(height + 1.6 * SIZE + legend.height());
-    let semantic = classes
-        .as_deref()
-        .map(|classes| above.picture(Colors::Classes(classes)));
     let pictures = [(Some(own), "textured mesh"), (semantic, "semantic mesh")];
     let shown = pictures
         .into_iter()

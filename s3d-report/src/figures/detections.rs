@@ -69,7 +69,7 @@ pub(super) fn detections(book: &Book<'_>, area: u32, found: &[Detection]) -> Res
         return Ok(None);
     }
 
-    let (above, picture) = Above::new(&file.mesh, &rooms);
+    let (above, picture, _) = Above::new(book, &file.mesh, &rooms, None);
     let legend = Legend::of(book, truth.iter().map(|(_, color)| *color));
     let width = 0.5 * (WIDTH - GAP);
     let height = width * above.aspect();

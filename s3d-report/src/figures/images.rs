@@ -1,6 +1,6 @@
 //! Images of a data set as pictures to look at.
 
-use super::sheet::{PIXELS, Picture};
+use super::sheet::{INCH, Picture};
 use crate::areas::classes;
 use crate::error::Result;
 use crate::poster::{palette_of, unlabelled};
@@ -61,15 +61,17 @@ const OUTSIDE: f64 = 0.01;
 /// Reads images of a data set.
 pub(super) struct Images<'a> {
     data: &'a DataSet,
+    /// The most pixels of a picture for each inch.
+    dpi: u32,
     table: Option<LabelTable>,
     /// The colour of each class.
     palette: Vec<[u8; 3]>,
 }
 
 impl<'a> Images<'a> {
-    pub(super) fn new(data: &'a DataSet) -> Result<Self> {
+    pub(super) fn new(data: &'a DataSet, dpi: u32) -> Result<Self> {
         let names: Vec<&str> = classes(data).iter().map(|class| class.name).collect();
-        Ok(Self { data, table: data.labels()?, palette: palette_of(&names) })
+        Ok(Self { data, dpi, table: data.labels()?, palette: palette_of(&names) })
     }
 
     /// Returns the names and colours of classes.
@@ -93,7 +95,7 @@ impl<'a> Images<'a> {
             Look::Classes => (decode_rgb8(&bytes, &path)?.map(|label| self.class_color(unpack(label))), None),
             Look::Instances => (decode_rgb8(&bytes, &path)?.map(|label| self.color(unpack(label))), None),
         };
-        let most = (width * PIXELS).ceil().max(1.0) as u32;
+        let most = (width * self.dpi as f32 / INCH).ceil().max(1.0) as u32;
         let [w, h] = [pixels.width(), pixels.height()];
         let reduced = if w > most {
             let height = (u64::from(h) * u64::from(most)).div_ceil(u64::from(w)) as u32;

@@ -32,18 +32,31 @@ use std::path::{Path, PathBuf};
 const FIGURES: FolderKind =
     FolderKind { about: "figures.json", generator: "s3d figures", noun: "the figures", action: "draw" };
 
+/// Pixels of an inch that journals ask for.
+const DEFAULT_DPI: u32 = 300;
+
 /// How figures are drawn.
 ///
 /// With the feature `clap` it is a group of arguments of a command line: comments of fields are help texts.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "clap", derive(clap::Args))]
 pub struct FiguresOptions {
+    /// The pixels of an inch, 30 to 1200: of the PNG files, and the most of the pictures in PDF files.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "PIXELS", default_value_t = DEFAULT_DPI,
+        value_parser = clap::value_parser!(u32).range(30..=1200)))]
+    pub dpi: u32,
     /// Also draw the detections in this list, which s3d detect run wrote, beside the true boxes.
     #[cfg_attr(feature = "clap", arg(long, value_name = "FOUND.json"))]
     pub detections: Option<PathBuf>,
     /// Replace earlier figures.
     #[cfg_attr(feature = "clap", arg(long))]
     pub overwrite: bool,
+}
+
+impl Default for FiguresOptions {
+    fn default() -> Self {
+        Self { dpi: DEFAULT_DPI, detections: None, overwrite: false }
+    }
 }
 
 /// A figure, before it is written.
@@ -56,6 +69,7 @@ struct Drawn {
 /// What figures are drawn from.
 struct Book<'a> {
     data: &'a DataSet,
+    dpi: u32,
     images: Images<'a>,
     /// The panoramas.
     panoramas: Vec<DatasetImage>,
@@ -66,7 +80,7 @@ struct Book<'a> {
 }
 
 impl<'a> Book<'a> {
-    fn read(data: &'a DataSet) -> Result<Self> {
+    fn read(data: &'a DataSet, dpi: u32) -> Result<Self> {
         let (mut panoramas, mut views, mut candidates) = (Vec::new(), Vec::new(), Vec::new());
         for &area in data.areas() {
             let records = data.views(area)?;
@@ -86,7 +100,7 @@ impl<'a> Book<'a> {
             }
             candidates.extend(records);
         }
-        Ok(Self { data, images: Images::new(data)?, panoramas, views, candidates })
+        Ok(Self { data, dpi, images: Images::new(data, dpi)?, panoramas, views, candidates })
     }
 
     /// The view of the highest entropy.
@@ -135,7 +149,7 @@ struct About {
 }
 
 /// Draws figures of the data set in the folder `out` for print, and writes them to the folder `to`, whole or
-/// not at all: each as PDF, and as PNG of 300 pixels an inch, 7 inches wide. `figures.tex` sets them in
+/// not at all: each as PDF, and as PNG, 7 inches wide. `figures.tex` sets them in
 /// LaTeX, and `figures.json` has their captions.
 ///
 /// | figure | what it shows |
@@ -155,11 +169,11 @@ struct About {
 /// `out`, a file of it or the list of detections is damaged, or `to` cannot be written, or is there and not
 /// to be replaced.
 pub fn figures(out: &Path, to: &Path, options: &FiguresOptions, ctx: &Context) -> Result<()> {
-    let FiguresOptions { detections, overwrite } = options;
+    let FiguresOptions { dpi, detections, overwrite } = options;
     let data = DataSet::open(out)?;
     let found = detections.as_deref().map(detections::read).transpose()?;
     let folder = NewFolder::begin(ctx, to, out, FIGURES, *overwrite)?;
-    let book = Book::read(&data)?;
+    let book = Book::read(&data, *dpi)?;
     let areas = data.areas().to_vec();
     let task = ctx.progress("drawing", "figures", 4 + areas.len() as u64);
 
@@ -175,7 +189,7 @@ pub fn figures(out: &Path, to: &Path, options: &FiguresOptions, ctx: &Context) -
         let file = |ending: &str| folder.path().join(format!("{name}.{ending}"));
         let pdf = pdf::pdf(&sheet).map_err(|e| s3d_io::Error::io(&file("pdf"), "make", e))?;
         write_bytes(&file("pdf"), &pdf)?;
-        write_rgb8(&file("png"), &png::pixels(&sheet), Content::Photo, Compression::default())?;
+        write_rgb8(&file("png"), &png::pixels(&sheet, *dpi), Content::Photo, Compression::default())?;
         tex.push_str(&format!(
             "\n\\begin{{figure*}}\n\t\\centering\n\t\\includegraphics[width=\\textwidth]{{{name}.pdf}}\n\
              \t\\caption{{{caption}}}\n\t\\label{{fig:{name}}}\n\\end{{figure*}}\n"

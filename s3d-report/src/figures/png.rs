@@ -1,25 +1,26 @@
 //! A page as pixels.
 
-use super::sheet::{Item, PIXELS, Picture, Sheet, Step, Stroke};
+use super::sheet::{INCH, Item, Picture, Sheet, Step, Stroke};
 use s3d_geom::Raster;
 use tiny_skia::{
     Color, FillRule, FilterQuality, IntSize, Paint, Path, PathBuilder, Pixmap, PixmapPaint, StrokeDash,
     Transform,
 };
 
-/// Returns the pixels of a page, 300 an inch.
-pub(super) fn pixels(sheet: &Sheet) -> Raster<[u8; 3]> {
-    let [width, height] = sheet.size.map(|side| ((side * PIXELS).round() as u32).max(1));
+/// Returns the pixels of a page, so many an inch.
+pub(super) fn pixels(sheet: &Sheet, dpi: u32) -> Raster<[u8; 3]> {
+    let scale = dpi as f32 / INCH;
+    let [width, height] = sheet.size.map(|side| ((side * scale).round() as u32).max(1));
     let mut page = Pixmap::new(width, height).expect("a page has pixels");
     page.fill(Color::WHITE);
-    let scale = Transform::from_scale(PIXELS, PIXELS);
+    let enlarged = Transform::from_scale(scale, scale);
 
     for item in &sheet.items {
         match item {
             Item::Picture { at: [x, y], size: [w, h], picture } => {
                 let size = [picture.pixels.width() as f32, picture.pixels.height() as f32];
                 let [sx, sy] = [w / size[0], h / size[1]];
-                let turn = Transform::from_row(sx, 0.0, 0.0, sy, *x, *y).post_scale(PIXELS, PIXELS);
+                let turn = Transform::from_row(sx, 0.0, 0.0, sy, *x, *y).post_scale(scale, scale);
                 let quality = if picture.is_photo {
                     FilterQuality::Bicubic
                 } else {
@@ -32,14 +33,14 @@ pub(super) fn pixels(sheet: &Sheet) -> Raster<[u8; 3]> {
             }
             Item::Fill { path, color } => {
                 if let Some(path) = path_of(path) {
-                    page.fill_path(&path, &paint_of(*color), FillRule::Winding, scale, None);
+                    page.fill_path(&path, &paint_of(*color), FillRule::Winding, enlarged, None);
                 }
             }
             Item::Line { path, stroke: Stroke { color, width, dashes } } => {
                 let dash = dashes.and_then(|dashes| StrokeDash::new(dashes.to_vec(), 0.0));
                 let stroke = tiny_skia::Stroke { width: *width, dash, ..tiny_skia::Stroke::default() };
                 if let Some(path) = path_of(path) {
-                    page.stroke_path(&path, &paint_of(*color), &stroke, scale, None);
+                    page.stroke_path(&path, &paint_of(*color), &stroke, enlarged, None);
                 }
             }
         }

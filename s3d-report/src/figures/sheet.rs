@@ -11,8 +11,8 @@ pub(super) const GREY: [u8; 3] = [120, 120, 120];
 pub(super) const WIDTH: f32 = 504.0;
 /// The size of words, points.
 pub(super) const SIZE: f32 = 8.0;
-/// Pixels of a picture for each point: 300 an inch.
-pub(super) const PIXELS: f32 = 300.0 / 72.0;
+/// An inch, points.
+pub(super) const INCH: f32 = 72.0;
 
 /// A place on a page: points of 1/72 inch, from the upper left corner to the right and down.
 pub(super) type Point = [f32; 2];

@@ -32,8 +32,8 @@ const FOV_DEG: f64 = 38.0;
 const BACK: DVec3 = dvec3(0.3, -0.62, 0.9);
 
 /// The background, which is the overview's in the dark, and the line between colours and classes.
-const GROUND: [f32; 3] = [60.0, 60.0, 66.0];
-const LINE: [f32; 3] = [255.0; 3];
+const GROUND: [u8; 3] = [60, 60, 66];
+const LINE: [u8; 3] = [255; 3];
 const LINE_PX: u32 = 3;
 
 /// The share of the mesh's own brightness in the colours of classes, so that shapes can be made out, and the
@@ -72,8 +72,7 @@ pub(crate) fn draw(data: &DataSet, to: &Path, ctx: &Context) -> Result<()> {
     let classes = class_colors(data, area, &mut faults)?;
     let rooms = rooms_of(data, area, &mut faults)?;
     let high = section(&mesh, &rooms.iter().collect::<Vec<_>>());
-    let colors = classes.as_deref().map_or(Colors::Own, Colors::Halves);
-    let picture = picture(&mesh, colors, high, SIZE, GROUND);
+    let picture = drawing(&mesh, classes.as_deref(), high, SIZE, GROUND).halves();
     write_rgb8(to, &picture, Content::Photo, Compression::default())?;
 
     for without in data.areas().iter().take_while(|each| **each != area) {
@@ -167,55 +166,64 @@ pub(crate) fn camera_of(mesh: &TriMesh, section: f64, size: [u32; 2]) -> Camera 
     Camera::perspective(pose, FOV_DEG.to_radians(), width, height)
 }
 
-/// The colours that a mesh is drawn in. Those of classes are a colour for each face.
-#[derive(Clone, Copy)]
-pub(crate) enum Colors<'a> {
-    /// Its own.
-    Own,
-    Classes(&'a [[u8; 3]]),
-    /// Its own on the left, and those of classes on the right of a line.
-    Halves(&'a [[u8; 3]]),
+/// A mesh obliquely from above.
+pub(crate) struct Drawing {
+    /// In its own colours.
+    pub(crate) own: Raster<[u8; 3]>,
+    /// In the colours of its classes.
+    pub(crate) classes: Option<Raster<[u8; 3]>>,
 }
 
-/// Draws a mesh below the height `section`, obliquely from above, before a ground of this colour.
-pub(crate) fn picture(
+impl Drawing {
+    /// Returns its own colours on the left, and those of classes on the right of a line. Without classes, its own.
+    fn halves(self) -> Raster<[u8; 3]> {
+        let Self { own, classes: Some(classes) } = self else { return self.own };
+        let [width, height] = [own.width(), own.height()];
+        let middle = width / 2;
+        let rows = own.rows().zip(classes.rows()).flat_map(|(own, classes)| {
+            (0..)
+                .zip(own.iter().zip(classes))
+                .map(move |(x, (own, class))| match x {
+                    x if middle.abs_diff(x) <= LINE_PX / 2 => LINE,
+                    x if x < middle => *own,
+                    _ => *class,
+                })
+        });
+        Raster::from_vec(width, height, rows.collect())
+    }
+}
+
+/// Draws a mesh below the height `section`, obliquely from above, before a ground of this colour. `classes` are
+/// the colours of the faces' classes.
+pub(crate) fn drawing(
     mesh: &TriMesh,
-    colors: Colors<'_>,
+    classes: Option<&[[u8; 3]]>,
     section: f64,
     size: [u32; 2],
-    ground: [f32; 3],
-) -> Raster<[u8; 3]> {
+    ground: [u8; 3],
+) -> Drawing {
     let camera = camera_of(mesh, section, size);
     let scene = Scene::new(mesh);
     let textures = MipMaps::new(mesh);
     let filter = TextureFilter::default();
     let rays = camera.rays();
     let [width, height] = size;
-    // Where the colours of classes begin.
-    let (classes, from) = match colors {
-        Colors::Own => (None, width),
-        Colors::Classes(classes) => (Some(classes), 0),
-        Colors::Halves(classes) => (Some(classes), width / 2),
-    };
-
     let fronts = Fronts::new(mesh, camera.pose.location);
     let shown = fronts.as_ref().map(|fronts| (Scene::new(&fronts.mesh), &fronts.faces));
 
-    let color = |x: u32, face: Option<u32>, direction: DVec3| -> [f32; 3] {
-        let Some(face) = face else { return ground };
-        let seen = rgb_of_ray(&scene, &textures, &camera, direction, face, &filter).map(f32::from);
-        let Some(classes) = classes.filter(|_| x >= from) else { return seen };
+    // Its own colour and that of its class.
+    let colors = |face: Option<u32>, direction: DVec3| -> [[f32; 3]; 2] {
+        let Some(face) = face else { return [ground.map(f32::from); 2] };
+        let own = rgb_of_ray(&scene, &textures, &camera, direction, face, &filter).map(f32::from);
+        let Some(classes) = classes else { return [own; 2] };
 
         let class = classes.get(face as usize).copied().unwrap_or_else(unlabelled);
         let facing = mesh.normal(face).as_dvec3().dot(direction.normalize()).abs() as f32;
-        let gray = LUMA
-            .iter()
-            .zip(seen)
-            .map(|(weight, channel)| weight * channel)
-            .sum::<f32>();
-        class.map(|channel| (1.0 - DETAIL) * f32::from(channel) * (0.6 + 0.4 * facing) + DETAIL * gray)
+        let gray: f32 = LUMA.iter().zip(own).map(|(weight, channel)| weight * channel).sum();
+        let shade = |channel| (1.0 - DETAIL) * f32::from(channel) * (0.6 + 0.4 * facing) + DETAIL * gray;
+        [own, class.map(shade)]
     };
-    let row = |y: u32| -> Vec<[u8; 3]> {
+    let row = |y: u32| -> Vec<[[u8; 3]; 2]> {
         // The rays of a pixel follow each other.
         let samples = (0..width).flat_map(|x| (0..SAMPLES * SAMPLES).map(move |sample| (x, sample)));
         let directions: Vec<DVec3> = samples
@@ -226,23 +234,24 @@ pub(crate) fn picture(
             None => vec![None; directions.len()],
         };
 
-        let of_pixels = directions.chunks(RAYS_A_PIXEL).zip(faces.chunks(RAYS_A_PIXEL)).zip(0..);
-        let pixel = |((directions, faces), x): ((&[DVec3], &[Option<u32>]), u32)| {
-            if matches!(colors, Colors::Halves(_)) && x.abs_diff(from) <= LINE_PX / 2 {
-                return LINE.map(|channel| channel as u8);
-            }
-            let mut sum = [0.0; 3];
+        let of_pixels = directions.chunks(RAYS_A_PIXEL).zip(faces.chunks(RAYS_A_PIXEL));
+        let pixel = |(directions, faces): (&[DVec3], &[Option<u32>])| {
+            let mut sums = [[0.0; 3]; 2];
             for (direction, face) in directions.iter().zip(faces) {
-                let seen = color(x, *face, *direction);
-                sum.iter_mut().zip(seen).for_each(|(sum, channel)| *sum += channel);
+                let seen = colors(*face, *direction);
+                let channels = sums.as_flattened_mut().iter_mut();
+                channels
+                    .zip(seen.as_flattened())
+                    .for_each(|(sum, channel)| *sum += channel);
             }
-            sum.map(|channel| (channel / RAYS_A_PIXEL as f32).round() as u8)
+            sums.map(|sum| sum.map(|channel: f32| (channel / RAYS_A_PIXEL as f32).round() as u8))
         };
         of_pixels.map(pixel).collect()
     };
 
-    let rows: Vec<Vec<[u8; 3]>> = (0..height).into_par_iter().map(row).collect();
-    Raster::from_vec(width, height, rows.concat())
+    let rows: Vec<Vec<[[u8; 3]; 2]>> = (0..height).into_par_iter().map(row).collect();
+    let both = Raster::from_vec(width, height, rows.concat());
+    Drawing { own: both.map(|[own, _]| own), classes: classes.map(|_| both.map(|[_, class]| class)) }
 }
 
 /// The faces of a mesh whose fronts are seen from a place.
@@ -343,10 +352,10 @@ mod tests {
         assert!(matches!(found[..], [Some(0 | 1), Some(2 | 3)]), "{found:?}");
         assert!(Fronts::new(&slabs(&[(2.5, false)]), eye).is_none());
 
-        let picture = picture(&house, Colors::Halves(&[[200, 0, 0]; 6]), 2.4, SIZE, GROUND);
+        let picture = drawing(&house, Some(&[[200, 0, 0]; 6]), 2.4, SIZE, GROUND).halves();
         let right = picture.at(SIZE[0] * 5 / 8, SIZE[1] / 2);
         assert!(right[0] > right[1] + 80 && right[1] == right[2], "{right:?}");
         assert_eq!(picture.at(SIZE[0] / 2, 10), [255; 3]);
-        assert_eq!(picture.at(0, 0), GROUND.map(|c| c as u8));
+        assert_eq!(picture.at(0, 0), GROUND);
     }
 }
