@@ -5,6 +5,7 @@ use common::{s3d, s3d_fails, s3d_ok, text};
 use s3d_dataset::{MeshAxes, read_mesh};
 use s3d_geom::glam::{DAffine3, DMat4, DVec3, Vec3};
 use s3d_geom::{Density, PointCloud, SurfaceSampler, TriMesh};
+use s3d_io::cloud::read_point_sample;
 use s3d_io::mesh::{MeshOrigin, MeshOut, write_ply_mesh};
 use s3d_synth::scenes::furnished_room;
 use std::fmt::Write as _;
@@ -84,12 +85,22 @@ fn a_cloud_far_away_is_found() {
     let points = dir.path().join("room.xyz");
     fs::write(&points, lines).unwrap();
 
-    let call = ["align", text(&points), text(&mesh), "--up-b", "z", "--units-b", "m", "--nth", "1"];
-    let output = s3d(&call);
+    let moved = dir.path().join("moved.ply");
+    let frame = ["--up-b", "z", "--units-b", "m", "--nth", "1"];
+    let call = |moved| [&["align", text(&points), text(&mesh), "-o", text(moved)], &frame[..]].concat();
+    let output = s3d(&call(&moved));
     assert!(output.status.success(), "{output:?}");
     let found = transform(&String::from_utf8(output.stdout).unwrap());
     let back = found.transform_point3(far.transform_point3(DVec3::ONE));
     assert!(back.distance(DVec3::ONE) < 0.01, "{back}");
+
+    // All its points are written in their order.
+    let written = read_point_sample(&moved, usize::MAX).unwrap();
+    assert_eq!(written.len(), cloud.len());
+    for (p, q) in written.positions.iter().zip(&cloud.positions) {
+        assert!(p.distance(*q) < 0.01, "{p} {q}");
+    }
+    s3d_fails(&call(&dir.path().join("moved.glb")), 2, &["moved.glb", "a cloud", ".ply"]);
 }
 
 #[test]

@@ -122,8 +122,8 @@ impl Scene {
         !child.wait().unwrap().success()
     }
 
-    /// Kills an export as soon as a file of its folder is there. It begins from what `prepare` makes, again if
-    /// it finished first.
+    /// Kills an export as soon as a file of its folder is there. It begins from what `prepare` makes, again
+    /// if it finished first.
     fn kill_when_there(&self, out: &Path, more: &[&str], name: &str, prepare: impl Fn()) {
         loop {
             prepare();

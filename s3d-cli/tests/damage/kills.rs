@@ -265,8 +265,8 @@ fn kill_each<'a>(commands: impl Iterator<Item = (usize, &'a &'static str)>) {
             let folder = template.begin(&format!("killed_{number}_{cycles}"));
             let before = kills;
             loop {
-                // After enough kills it is left alone: a command that begins anew each time would not end on a
-                // machine that has become slower.
+                // After enough kills it is left alone: a command that begins anew each time would not end on
+                // a machine that has become slower.
                 let share = 0.02 + 1.08 * random.below(1000) as f64 / 1000.0;
                 let delay = (kills < wanted).then(|| took.mul_f64(share));
                 let started = Instant::now();

@@ -14,7 +14,7 @@ def test_pdf_and_png_show_the_same(s3d, demo, tmp_path):
     s3d("figures", out, "-o", figs)
 
     pages = sorted(figs.glob("*.pdf"))
-    assert [page.stem for page in pages] == ["area_1", "distributions", "examples", "modalities", "samples"]
+    assert [page.stem for page in pages] == ["area_1", "classes", "distributions", "examples", "modalities", "samples"]
     for page in pages:
         [sheet] = pdfium.PdfDocument(page)
         assert sheet.get_width() == 504

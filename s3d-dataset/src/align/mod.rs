@@ -11,13 +11,17 @@ use crate::error::{Error, Result, UsageError};
 use crate::mesh_axes::MeshAxes;
 use crate::store::NewFile;
 use glam::{DAffine3, DVec3, Vec3};
-use read::{Read, has_ending, read};
+use read::{Cloud, Read, Shape, has_ending, read};
 use s3d_fusion::{AlignError, AlignOptions as SearchOptions, Aligned, SurfacePoints, align as search};
-use s3d_geom::TriMesh;
+use s3d_geom::{PointCloud, TriMesh};
+use s3d_io::cloud::ColoredPointWriter;
 use s3d_io::mesh::{LengthUnit, MeshOut, UpAxis, write_ply_mesh, write_textured_glb};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
+
+/// The number of points that are written at a time.
+const BLOCK: usize = 1 << 16;
 
 /// How two meshes or clouds are aligned. With the feature `clap` it is a group of arguments of a command
 /// line.
@@ -50,7 +54,7 @@ pub struct AlignOptions {
     #[cfg_attr(feature = "clap", arg(long, value_name = "m|cm|mm|ft|in",
         value_parser = crate::options::words::parsed::<LengthUnit>))]
     pub units_b: Option<LengthUnit>,
-    /// Write the first one, a mesh, into the frame of the second: .ply, or .glb with textures.
+    /// Write the first one into the frame of the second: .ply, or for a mesh .glb with textures.
     #[cfg_attr(feature = "clap", arg(short, long, value_name = "moved.glb"))]
     pub output: Option<PathBuf>,
     /// Replace the file if it exists.
@@ -63,12 +67,13 @@ pub struct AlignOptions {
 ///
 /// # Errors
 /// [`Error::File`] and [`Error::Input`] for files that cannot be read, have too little surface, or do not
-/// fit. [`Error::Usage`] if the output exists and is not to be replaced, or `a` is a cloud and there is an
-/// output. [`Error::Cancelled`].
+/// fit. [`Error::Usage`] if the output exists and is not to be replaced, or has another ending than what is
+/// written. [`Error::Cancelled`].
 pub fn align(a: &Path, b: &Path, options: &AlignOptions, ctx: &Context) -> Result<AlignReport> {
     if let Some(output) = &options.output {
         if !has_ending(output, "ply") && !has_ending(output, "glb") {
-            let why = "a mesh is written as PLY or GLB: give it a name that ends with .ply or .glb";
+            let why = "a mesh is written as PLY or GLB, and a cloud as PLY: give it a name that ends with \
+                       .ply or .glb";
             return Err(UsageError::WrongEnding { path: output.clone(), why }.into());
         }
         NewFile::check_free(output, options.overwrite)?;
@@ -79,8 +84,10 @@ pub fn align(a: &Path, b: &Path, options: &AlignOptions, ctx: &Context) -> Resul
         MeshAxes { up: options.up_b, units: options.units_b },
     ];
     let [read_a, read_b] = [read(a, of_a, ctx)?, read(b, of_b, ctx)?];
-    if let (Some(output), None) = (&options.output, &read_a.mesh) {
-        let why = "the first one is a cloud, and only meshes are written: move it by the transform";
+    if let (Some(output), Shape::Cloud(_)) = (&options.output, &read_a.shape)
+        && !has_ending(output, "ply")
+    {
+        let why = "the first one is a cloud, which is written as PLY: give it a name that ends with .ply";
         return Err(UsageError::WrongEnding { path: output.clone(), why }.into());
     }
 
@@ -99,13 +106,23 @@ pub fn align(a: &Path, b: &Path, options: &AlignOptions, ctx: &Context) -> Resul
         return Err(Error::unfit(a, why));
     };
 
-    if let (Some(output), Some(mesh), None) = (&options.output, read_a.mesh, &report.doubt) {
+    if let (Some(output), None) = (&options.output, &report.doubt) {
         // Positions are `f32`, so the offset of a far frame stays subtracted.
-        let near = DAffine3::from_translation(-read_b.offset_m)
-            * place.b_from_a
-            * DAffine3::from_translation(read_a.offset_m);
-        let moved = mesh.transformed(&near).map_err(|e| Error::unfit(a, e.to_string()))?;
-        write(&moved, output, read_b.offset_m, options.overwrite, ctx)?;
+        let offset_m = read_b.offset_m;
+        let near = DAffine3::from_translation(-offset_m) * place.b_from_a;
+        let file = NewFile::begin(ctx, output, options.overwrite)?;
+        match read_a.shape {
+            Shape::Mesh(mesh) => {
+                let near = near * DAffine3::from_translation(read_a.offset_m);
+                let moved = mesh.transformed(&near).map_err(|e| Error::unfit(a, e.to_string()))?;
+                write_mesh(&moved, file.path(), has_ending(output, "glb"), offset_m)?;
+            }
+            Shape::Cloud(cloud) => write_cloud(&cloud, &near, file.path(), offset_m, ctx)?,
+        }
+        file.finish()?;
+        if offset_m != DVec3::ZERO {
+            ctx.info(format_args!("{}: {:?} is subtracted", output.display(), offset_m.to_array()));
+        }
     }
     Ok(report)
 }
@@ -137,23 +154,43 @@ fn found(a: &Path, b: &Path, of_a: &Read, of_b: &Read, options: &AlignOptions) -
     Ok(aligned)
 }
 
-fn write(mesh: &TriMesh, path: &Path, offset_m: DVec3, overwrite: bool, ctx: &Context) -> Result<()> {
+fn write_mesh(mesh: &TriMesh, path: &Path, is_glb: bool, offset_m: DVec3) -> Result<()> {
+    if is_glb {
+        return Ok(write_textured_glb(path, mesh).map(drop)?);
+    }
     let mut comments = Vec::new();
     if offset_m != DVec3::ZERO {
         let [x, y, z] = offset_m.to_array();
         comments.push(format!("offset {x} {y} {z} was subtracted"));
-        ctx.info(format_args!("{}: {:?} is subtracted", path.display(), offset_m.to_array()));
     }
-    let file = NewFile::begin(ctx, path, overwrite)?;
-    if has_ending(path, "glb") {
-        write_textured_glb(file.path(), mesh)?;
-    } else {
-        let positions: &[Vec3] = mesh.positions();
-        let colors = &mesh.parts().colors;
-        let colors: &[[u8; 3]] = if colors.len() == positions.len() { colors } else { &[] };
-        let out =
-            MeshOut { positions, faces: mesh.faces(), colors, comments: &comments, ..MeshOut::default() };
-        write_ply_mesh(file.path(), &out)?;
-    }
-    file.finish()
+    let positions: &[Vec3] = mesh.positions();
+    let colors = &mesh.parts().colors;
+    let colors: &[[u8; 3]] = if colors.len() == positions.len() { colors } else { &[] };
+    let out = MeshOut { positions, faces: mesh.faces(), colors, comments: &comments, ..MeshOut::default() };
+    write_ply_mesh(path, &out)?;
+    Ok(())
+}
+
+/// Reads a cloud again and writes all its points, moved by `moved`. A point without a colour is black.
+fn write_cloud(cloud: &Cloud, moved: &DAffine3, path: &Path, offset_m: DVec3, ctx: &Context) -> Result<()> {
+    let task = ctx.progress("writing", "points", cloud.count);
+    let mut writer = ColoredPointWriter::create(path, cloud.count, offset_m)?;
+    let mut block = PointCloud::default();
+    let mut flush = |block: &mut PointCloud| -> Result<()> {
+        writer.append(block)?;
+        task.add(block.len() as u64);
+        block.clear();
+        Ok(())
+    };
+    cloud.each_point(ctx, &mut |point| {
+        block.positions.push(moved.transform_point3(point.position_m).as_vec3());
+        block.colors.push(point.color.unwrap_or_default());
+        if block.len() == BLOCK {
+            flush(&mut block)?;
+        }
+        Ok(())
+    })?;
+    flush(&mut block)?;
+    writer.finish()?;
+    Ok(())
 }

@@ -10,7 +10,8 @@ use s3d_io::cloud::{AnnotationOptions, Annotations, InstanceReader};
 use s3d_io::mesh::{LengthUnit, MeshFormat, MeshOrigin, UpAxis};
 use s3d_io::raw::{RawOptions, RawScan};
 use std::collections::HashMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::slice;
 
 /// The edge of the cubes that clouds are thinned by while they are read, metres.
 const CELL_M: f64 = 0.02;
@@ -24,9 +25,34 @@ pub(super) struct Read {
     pub(super) points: SurfacePoints,
     /// Subtracted from the coordinates of the file, world axes, metres.
     pub(super) offset_m: DVec3,
-    /// `None` for a cloud.
-    pub(super) mesh: Option<TriMesh>,
+    pub(super) shape: Shape,
 }
+
+/// What a surface was read from.
+pub(super) enum Shape {
+    Mesh(TriMesh),
+    Cloud(Cloud),
+}
+
+/// A laser scan or annotated points, whose points are read as often as they are asked for.
+pub(super) struct Cloud {
+    path: PathBuf,
+    world_from_file: DAffine3,
+    is_annotated: bool,
+    /// The number of points with finite coordinates.
+    pub(super) count: u64,
+}
+
+/// A point of a cloud, in the world.
+pub(super) struct CloudPoint {
+    pub(super) position_m: DVec3,
+    /// Where the scanner was, if that is known.
+    origin_m: Option<DVec3>,
+    pub(super) color: Option<[u8; 3]>,
+}
+
+/// What is done with each point.
+pub(super) type Take<'a> = dyn FnMut(CloudPoint) -> Result<()> + Send + 'a;
 
 /// Reads a mesh, a laser scan, or annotated points.
 pub(super) fn read(path: &Path, axes: MeshAxes, ctx: &Context) -> Result<Read> {
@@ -36,65 +62,87 @@ pub(super) fn read(path: &Path, axes: MeshAxes, ctx: &Context) -> Result<Read> {
     if !is_annotated && !is_points && MeshFormat::of(path).is_some() {
         let file = read_mesh(path, axes, MeshOrigin::Near, ctx)?;
         let points = SurfacePoints::of_mesh(&file.mesh).map_err(thin)?;
-        return Ok(Read { points, offset_m: file.offset_m, mesh: Some(file.mesh) });
+        return Ok(Read { points, offset_m: file.offset_m, shape: Shape::Mesh(file.mesh) });
     }
-
-    let turn = axes.up.map_or(DMat3::IDENTITY, UpAxis::rotation);
-    let world_from_file = DAffine3::from_mat3(turn * axes.units.map_or(1.0, LengthUnit::metres));
-    let mut thinned = Thinned::default();
-    if is_annotated {
-        read_annotated(path, world_from_file, &mut thinned, ctx)?;
-    } else if is_points || !path.exists() {
-        read_scans(path, world_from_file, &mut thinned, ctx)?;
-    } else {
+    if !is_annotated && !is_points && path.exists() {
         let why = "is no mesh (OBJ, glTF, GLB, PLY), no laser scan (E57, PTX, LAS, LAZ, PLY, PCD, text), and \
                    no annotated points (a folder, or pointcloud.mat)";
         return Err(Error::unfit(path, why));
     }
+
+    let turn = axes.up.map_or(DMat3::IDENTITY, UpAxis::rotation);
+    let world_from_file = DAffine3::from_mat3(turn * axes.units.map_or(1.0, LengthUnit::metres));
+    let mut cloud = Cloud { path: path.to_owned(), world_from_file, is_annotated, count: 0 };
+    let (mut thinned, mut count) = (Thinned::default(), 0);
+    let warnings = cloud.each_point(ctx, &mut |point: CloudPoint| {
+        count += 1;
+        thinned.add(point.position_m, point.origin_m.map(|origin| origin - point.position_m));
+        Ok(())
+    })?;
+    ctx.warn_each(&warnings);
+    cloud.count = count;
     let (offset_m, positions, sides) = thinned.columns();
     let points = SurfacePoints::of_points(&positions, &sides).map_err(thin)?;
-    Ok(Read { points, offset_m, mesh: None })
+    Ok(Read { points, offset_m, shape: Shape::Cloud(cloud) })
 }
 
 pub(super) fn has_ending(path: &Path, ending: &str) -> bool {
     path.extension().is_some_and(|found| found.eq_ignore_ascii_case(ending))
 }
 
-fn read_scans(path: &Path, world_from_file: DAffine3, to: &mut Thinned, ctx: &Context) -> Result<()> {
-    let options = RawOptions { world_from_file, ..RawOptions::default() };
-    let RawScan::Scans(scans) = RawScan::open(path, &options)? else {
-        let why = "depth pictures are fused to a mesh first: `s3d fuse`";
-        return Err(Error::unfit(path, why));
-    };
-    ctx.warn_each(&scans.warnings);
-    for (number, scan) in scans.scans().iter().enumerate() {
-        let read = scans.read(number, |block| {
-            ctx.check()?;
-            for (i, p) in block.positions_m.iter().enumerate() {
-                let origin = block.origins_m.get(i).copied().or(scan.origin_m);
-                to.add(*p, origin.map(|origin| origin - *p));
+impl Cloud {
+    /// Hands on each point with finite coordinates, in the order of the files. Returns what is doubtful in
+    /// them.
+    pub(super) fn each_point(&self, ctx: &Context, take: &mut Take<'_>) -> Result<Vec<String>> {
+        let mut finite = |point: CloudPoint| {
+            if point.position_m.is_finite() {
+                take(point)?;
             }
-            Ok::<(), Error>(())
-        })?;
-        ctx.warn_each(&read.warnings);
+            Ok(())
+        };
+        if self.is_annotated {
+            self.each_annotated(ctx, &mut finite)
+        } else {
+            self.each_measured(ctx, &mut finite)
+        }
     }
-    Ok(())
-}
 
-fn read_annotated(path: &Path, world_from_file: DAffine3, to: &mut Thinned, ctx: &Context) -> Result<()> {
-    let area = Annotations::open(&[path.to_owned()], &AnnotationOptions::default())?;
-    ctx.warn_each(&area.warnings);
-    let mut reader = InstanceReader::new(BLOCK);
-    for instance in area.rooms.iter().flat_map(|room| &room.instances) {
-        reader.read(instance, None, |block: &PointCloud, _| {
-            ctx.check()?;
-            for p in &block.positions {
-                to.add(world_from_file.transform_point3(p.as_dvec3()), None);
-            }
-            Ok::<(), Error>(())
-        })?;
+    fn each_measured(&self, ctx: &Context, take: &mut Take<'_>) -> Result<Vec<String>> {
+        let options = RawOptions { world_from_file: self.world_from_file, ..RawOptions::default() };
+        let RawScan::Scans(scans) = RawScan::open(&self.path, &options)? else {
+            let why = "depth pictures are fused to a mesh first: `s3d fuse`";
+            return Err(Error::unfit(&self.path, why));
+        };
+        let mut warnings = scans.warnings.clone();
+        for (number, scan) in scans.scans().iter().enumerate() {
+            let read = scans.read(number, |block| {
+                ctx.check()?;
+                for (i, position_m) in block.positions_m.iter().copied().enumerate() {
+                    let origin_m = block.origins_m.get(i).copied().or(scan.origin_m);
+                    take(CloudPoint { position_m, origin_m, color: block.colors.get(i).copied() })?;
+                }
+                Ok::<(), Error>(())
+            })?;
+            warnings.extend(read.warnings);
+        }
+        Ok(warnings)
     }
-    Ok(())
+
+    fn each_annotated(&self, ctx: &Context, take: &mut Take<'_>) -> Result<Vec<String>> {
+        let area = Annotations::open(slice::from_ref(&self.path), &AnnotationOptions::default())?;
+        let mut reader = InstanceReader::new(BLOCK);
+        for instance in area.rooms.iter().flat_map(|room| &room.instances) {
+            reader.read(instance, None, |block: &PointCloud, _| {
+                ctx.check()?;
+                for (i, p) in block.positions.iter().enumerate() {
+                    let position_m = self.world_from_file.transform_point3(p.as_dvec3());
+                    take(CloudPoint { position_m, origin_m: None, color: block.colors.get(i).copied() })?;
+                }
+                Ok::<(), Error>(())
+            })?;
+        }
+        Ok(area.warnings)
+    }
 }
 
 /// Points of a cloud of any size, thinned by cubes.
@@ -120,9 +168,6 @@ struct Cell {
 impl Thinned {
     /// Adds a point in the world, with the way to the scanner if that is known.
     fn add(&mut self, p: DVec3, side: Option<DVec3>) {
-        if !p.is_finite() {
-            return;
-        }
         let offset = *self.offset_m.get_or_insert((p / 100.0).round() * 100.0);
         self.has_unseen |= side.is_none();
         let p = p - offset;
@@ -191,7 +236,6 @@ mod tests {
         for i in 0..1000 {
             thinned.add(at + DVec3::new(0.001 * f64::from(i), 0.0, 0.0), None);
         }
-        thinned.add(DVec3::NAN, None);
         thinned.widen();
         let (offset, positions, sides) = thinned.columns();
         assert_eq!(offset, DVec3::new(500_000.0, 5_400_000.0, 300.0));

@@ -45,6 +45,8 @@ const TYPES: [[&str; 2]; 11] = [
 struct Table<'a> {
     caption: &'a str,
     label: &'a str,
+    /// The share of the page's width that a wide table is set in; `None`: as wide as it comes.
+    width: Option<f64>,
     /// How columns are set, with the rules between them.
     columns: String,
     /// Rows of the head.
@@ -60,14 +62,15 @@ struct Table<'a> {
 impl Statistics {
     /// Returns the tables in LaTeX, in the layout of the paper: this data set's column of the comparison of
     /// data sets; then, with a row for each area, points and faces, images, instances of the classes, and
-    /// rooms of each type. They need the packages `amssymb` and `multirow`.
+    /// rooms of each type. They need the packages `amssymb`,
+    /// `graphicx` and `multirow`.
     ///
     /// Classes and types are S3DIS's: those of another taxonomy count as what they are there, but in the
     /// comparison, which has the data set's own. Instances of clutter are left out, as in the paper. Without
     /// labels the tables of instances and rooms are left out. The comparison is left out of statistics that
     /// were counted without the data set's options.
     pub fn to_latex(&self) -> String {
-        let mut text = String::from("% \\usepackage{amssymb,multirow}\n");
+        let mut text = String::from("% \\usepackage{amssymb,graphicx,multirow}\n");
         if let Some(images) = &self.images {
             comparison(&mut text, images, &self.areas);
         }
@@ -76,6 +79,7 @@ impl Statistics {
             &Table {
                 caption: "Statistics of 3D Data",
                 label: "tab:3DmodalStats",
+                width: None,
                 columns: "c|cc".into(),
                 head: vec!["Area & Number of 3D Points & Number of Mesh Faces".into()],
                 zero: "0",
@@ -88,6 +92,7 @@ impl Statistics {
             &Table {
                 caption: "Statistics of Images (\\textbf{I}: Regular, \\textbf{E}: Equirectangular Images)",
                 label: "tab:2DmodalStats",
+                width: None,
                 columns: "c|cc|c".into(),
                 head: vec![
                     "\\multirow{2}{*}{Area} & \
@@ -115,6 +120,7 @@ impl Statistics {
             &Table {
                 caption: "Object Class Statistics",
                 label: "tab:objectStats",
+                width: Some(0.85),
                 columns: format!("c|{}|{}|c", "c".repeat(STRUCTURAL), "c".repeat(movable)),
                 head: vec![
                     format!(
@@ -141,6 +147,7 @@ impl Statistics {
             &Table {
                 caption: "Scene and Space Statistics",
                 label: "tab:sceneClassStats",
+                width: Some(0.9),
                 columns: format!("c|c|{}|c", "c".repeat(types.len())),
                 head: vec![
                     format!(
@@ -167,9 +174,12 @@ impl Statistics {
     }
 
     fn latex_table(&self, text: &mut String, table: &Table<'_>) {
-        let Table { caption, label, columns, head, zero, is_total_bold, cells } = table;
+        let Table { caption, label, width, columns, head, zero, is_total_bold, cells } = table;
         let _ = writeln!(text, "\n\\begin{{table*}}\n\t\\centering\n\t\\caption{{{caption}}}");
-        let _ = writeln!(text, "\t\\begin{{tabular}}{{{columns}}}");
+        let [fit, fitted] = width.map_or_else(Default::default, |share| {
+            [format!("\\resizebox{{{share}\\textwidth}}{{!}}{{%\n\t"), "}".to_owned()]
+        });
+        let _ = writeln!(text, "\t{fit}\\begin{{tabular}}{{{columns}}}");
         head.iter().for_each(|row| text.push_str(&format!("\t\t{row} \\\\\n")));
         text.push_str("\t\t\\hline\n");
 
@@ -190,7 +200,7 @@ impl Statistics {
             .map(|n| format!("\\textbf{{{}}}", grouped(n)))
             .collect();
         let _ = writeln!(text, "\t\t\\hline\n\t\t\\textbf{{Total}} & {} \\\\", totals.join(" & "));
-        let _ = writeln!(text, "\t\\end{{tabular}}\n\t\\label{{{label}}}\n\\end{{table*}}");
+        let _ = writeln!(text, "\t\\end{{tabular}}{fitted}\n\t\\label{{{label}}}\n\\end{{table*}}");
     }
 }
 

@@ -119,7 +119,7 @@ pub fn markdown(tables: &[Table]) -> String {
 }
 
 /// Writes the table at IoU > .5 of several seeds as LaTeX, in the layout of the paper: the largest number of
-/// each column is bold.
+/// each column is bold. It needs the package `graphicx`.
 pub fn latex(tables: &[Table]) -> String {
     let rows: Vec<(&str, Vec<String>)> = tables
         .first()
@@ -136,13 +136,14 @@ pub fn latex(tables: &[Table]) -> String {
     let classes = CLASSES.map(|c| c.name());
     let (structural, movable) = (STRUCTURAL + 1, CLASSES.len() - STRUCTURAL + 1);
     let columns = [&classes[..STRUCTURAL], &["mean"], &classes[STRUCTURAL..], &["mean", "mean"]].concat();
-    let mut out = String::from("\\begin{table*}\n\t\\centering\n");
+    let mut out = String::from("% \\usepackage{graphicx}\n\\begin{table*}\n\t\\centering\n");
     let elements =
         |count: usize, of: &str| format!("\\multicolumn{{{count}}}{{|c|}}{{\\textbf{{{of} Elements}}}}");
     let _ = writeln!(
         out,
         "\t\\caption{{\\textbf{{Baseline 3D Object Detection Results}}. Class specific average precision \
-         (AP) using different features.}}\n\t\\begin{{tabular}}{{r|{}|{}|c}}",
+         (AP) using different features.}}\n\t\\resizebox{{\\textwidth}}{{!}}{{%\n\t\
+         \\begin{{tabular}}{{r|{}|{}|c}}",
         "c".repeat(structural),
         "c".repeat(movable)
     );
@@ -161,7 +162,7 @@ pub fn latex(tables: &[Table]) -> String {
         let _ = writeln!(out, "\t\t{name} & {} \\\\", cells.join(" & "));
     }
     let _ =
-        writeln!(out, "\t\\end{{tabular}}\n\t\\label{{tab:CVPR16quantitative}}\n\\end{{table*}}\n% {NOTE}");
+        writeln!(out, "\t\\end{{tabular}}}}\n\t\\label{{tab:CVPR16quantitative}}\n\\end{{table*}}\n% {NOTE}");
     out
 }
 

@@ -98,8 +98,8 @@ pub use of_label_file::AnnotatedMesh;
 pub use passes::{InstancePasses, InstanceReader, PointPasses};
 #[cfg(feature = "ply")]
 pub use ply::{
-    LabelledPoint, LabelledPoints, PlyPointWriter, read_ply_point_count, read_point_sample,
-    write_colored_points,
+    ColoredPointWriter, LabelledPoint, LabelledPoints, PlyPointWriter, read_ply_point_count,
+    read_point_sample, write_colored_points,
 };
 pub use s3dis::{
     AnnotationTree, InstanceFile, OnFault, PointReader, RoomFiles, S3disAreaWriter, S3disInstance,

@@ -1,6 +1,7 @@
 //! Detections in 3D beside the true boxes.
 
-use super::areas::{Above, GAP, Legend, WHITE};
+use super::areas::{Above, GAP, Legend};
+use super::images::pale;
 use super::sheet::{Align, INK, Picture, Point, SIZE, Sheet, Stroke, WIDTH};
 use super::{Book, Drawn};
 use crate::error::Result;
@@ -91,15 +92,6 @@ pub(super) fn detections(book: &Book<'_>, area: u32, found: &[Detection]) -> Res
          scores: of each class as many as there are."
     );
     Ok(Some(Drawn { name: format!("detections_{area}"), caption, sheet }))
-}
-
-/// Grey and light, so that boxes stand out. The paper stays white.
-fn pale([r, g, b]: [u8; 3]) -> [u8; 3] {
-    if [r, g, b] == WHITE {
-        return WHITE;
-    }
-    let grey = (u32::from(r) * 2 + u32::from(g) * 5 + u32::from(b)) / 8;
-    [(135 + grey * 100 / 255) as u8; 3]
 }
 
 /// Returns the twelve edges of a box on a page, without those that are not before the camera.

@@ -9,7 +9,7 @@ use s3d_dataset::DataSet;
 use s3d_geom::{DEFAULT_COLOR, Raster};
 use s3d_io::dataset::{DatasetImage, Domain};
 use s3d_io::image::{decode_gray16, decode_rgb8, decode_xyz};
-use s3d_label::{LabelId, LabelTable, pretty_color};
+use s3d_label::{Class, LabelId, LabelTable, pretty_color};
 use s3d_render::{MISSING_DEPTH, MISSING_NORMAL};
 
 /// What an image is drawn as.
@@ -95,28 +95,90 @@ impl<'a> Images<'a> {
             Look::Classes => (decode_rgb8(&bytes, &path)?.map(|label| self.class_color(unpack(label))), None),
             Look::Instances => (decode_rgb8(&bytes, &path)?.map(|label| self.color(unpack(label))), None),
         };
-        let most = (width * self.dpi as f32 / INCH).ceil().max(1.0) as u32;
-        let [w, h] = [pixels.width(), pixels.height()];
-        let reduced = if w > most {
-            let height = (u64::from(h) * u64::from(most)).div_ceil(u64::from(w)) as u32;
-            mean(&pixels, [most, height.max(1)], missing)
-        } else {
-            pixels
-        };
+        let reduced = self.reduced(pixels, width, missing);
         let pixels = reduced.map(|pixel| if Some(pixel) == missing { NOTHING } else { pixel });
         Ok(Picture { pixels, is_photo: look == Look::Colors })
     }
 
+    /// Returns the colours of an image, and what is of another class than this one pale, drawn as wide as
+    /// [`Images::picture`].
+    ///
+    /// # Errors
+    /// As [`Images::picture`].
+    pub(super) fn picture_of_class(&self, image: &DatasetImage, class: usize, width: f32) -> Result<Picture> {
+        let colors = self.rgb(image, Domain::Rgb)?;
+        let labels = self.rgb(image, Domain::Semantic)?;
+        let [w, h] = [colors.width(), colors.height()];
+        if [w, h] != [labels.width(), labels.height()] {
+            let path = image.path(self.data.layout(), Domain::Semantic);
+            return Err(s3d_io::Error::format(&path, "has not as many pixels as the colours").into());
+        }
+        let seen = colors.pixels().iter().zip(labels.pixels()).map(|(color, label)| {
+            let is_shown = self
+                .class(unpack(*label))
+                .is_some_and(|of_pixel| of_pixel.index() == class);
+            if is_shown { *color } else { pale(*color) }
+        });
+        let pixels = self.reduced(Raster::from_vec(w, h, seen.collect()), width, None);
+        Ok(Picture { pixels, is_photo: true })
+    }
+
+    /// Returns the share of an image's pixels that each class has.
+    ///
+    /// # Errors
+    /// As [`Images::picture`].
+    pub(super) fn shares_of_classes(&self, image: &DatasetImage) -> Result<Vec<f64>> {
+        let labels = self.rgb(image, Domain::Semantic)?;
+        let mut counts = vec![0_u32; self.palette.len()];
+        for run in labels.pixels().chunk_by(|a, b| a == b) {
+            let class = run.first().and_then(|label| self.class(unpack(*label)));
+            if let Some(count) = class.and_then(|class| counts.get_mut(class.index())) {
+                *count += run.len() as u32;
+            }
+        }
+        let all = f64::from(labels.width()) * f64::from(labels.height());
+        Ok(counts.into_iter().map(|count| f64::from(count) / all).collect())
+    }
+
+    fn rgb(&self, image: &DatasetImage, domain: Domain) -> Result<Raster<[u8; 3]>> {
+        let path = image.path(self.data.layout(), domain);
+        Ok(decode_rgb8(&self.data.read(&path)?, &path)?)
+    }
+
+    /// No more pixels than the figure has on this width, in points.
+    fn reduced(&self, pixels: Raster<[u8; 3]>, width: f32, missing: Option<[u8; 3]>) -> Raster<[u8; 3]> {
+        let most = (width * self.dpi as f32 / INCH).ceil().max(1.0) as u32;
+        let [w, h] = [pixels.width(), pixels.height()];
+        if w <= most {
+            return pixels;
+        }
+        let height = (u64::from(h) * u64::from(most)).div_ceil(u64::from(w)) as u32;
+        mean(&pixels, [most, height.max(1)], missing)
+    }
+
+    fn class(&self, label: u32) -> Option<Class> {
+        self.table.as_ref()?.class_of(LabelId(label))
+    }
+
     fn class_color(&self, label: u32) -> [u8; 3] {
-        let class = self.table.as_ref().and_then(|table| table.class_of(LabelId(label)));
-        let color = class.and_then(|class| self.palette.get(class.index()).copied());
+        let color = self
+            .class(label)
+            .and_then(|class| self.palette.get(class.index()).copied());
         color.unwrap_or_else(unlabelled)
     }
 
     fn color(&self, label: u32) -> [u8; 3] {
-        let class = self.table.as_ref().and_then(|table| table.class_of(LabelId(label)));
-        class.map_or_else(unlabelled, |_| pretty_color(label))
+        self.class(label).map_or_else(unlabelled, |_| pretty_color(label))
     }
+}
+
+/// Grey and light, so that what is drawn over it or beside it stands out. The paper stays white.
+pub(super) fn pale([r, g, b]: [u8; 3]) -> [u8; 3] {
+    if [r, g, b] == NOTHING {
+        return NOTHING;
+    }
+    let grey = (u32::from(r) * 2 + u32::from(g) * 5 + u32::from(b)) / 8;
+    [(135 + grey * 100 / 255) as u8; 3]
 }
 
 /// Depth as greys, from white to dark.

@@ -4,6 +4,7 @@
 //! outlines (`font`). Each other module draws one figure.
 
 mod areas;
+mod classes;
 mod detections;
 mod distributions;
 mod examples;
@@ -159,6 +160,7 @@ struct About {
 /// | `samples` | that panorama with the frames of its views |
 /// | `distributions` | yaw, pitch and field of view of the views, with the paper's curves |
 /// | `examples` | the richest view of each type of room in four modalities |
+/// | `classes` | a view of each class, with all else pale |
 /// | `detections_N` | on request: true boxes of an area, and the best detections |
 ///
 /// Figures of what the data set does not have are left out and told. The richest is what has the highest
@@ -175,7 +177,7 @@ pub fn figures(out: &Path, to: &Path, options: &FiguresOptions, ctx: &Context) -
     let folder = NewFolder::begin(ctx, to, out, FIGURES, *overwrite)?;
     let book = Book::read(&data, *dpi)?;
     let areas = data.areas().to_vec();
-    let task = ctx.progress("drawing", "figures", 4 + areas.len() as u64);
+    let task = ctx.progress("drawing", "figures", 5 + areas.len() as u64);
 
     let mut captions = BTreeMap::new();
     let mut tex = String::from("% \\usepackage{graphicx}\n");
@@ -204,6 +206,7 @@ pub fn figures(out: &Path, to: &Path, options: &FiguresOptions, ctx: &Context) -
     place("samples", samples::samples(&book)?)?;
     place("distributions", distributions::distributions(&book))?;
     place("examples", examples::examples(&book)?)?;
+    place("classes", classes::classes(&book)?)?;
     if let Some(found) = &found {
         let there = |area: &&u32| found.iter().any(|d| d.area == **area);
         for &area in areas.iter().filter(there) {

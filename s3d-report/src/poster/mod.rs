@@ -175,7 +175,8 @@ pub(crate) struct Drawing {
 }
 
 impl Drawing {
-    /// Returns its own colours on the left, and those of classes on the right of a line. Without classes, its own.
+    /// Returns its own colours on the left, and those of classes on the right of a line. Without classes, its
+    /// own.
     fn halves(self) -> Raster<[u8; 3]> {
         let Self { own, classes: Some(classes) } = self else { return self.own };
         let [width, height] = [own.width(), own.height()];
@@ -193,8 +194,8 @@ impl Drawing {
     }
 }
 
-/// Draws a mesh below the height `section`, obliquely from above, before a ground of this colour. `classes` are
-/// the colours of the faces' classes.
+/// Draws a mesh below the height `section`, obliquely from above, before a ground of this colour. `classes`
+/// are the colours of the faces' classes.
 pub(crate) fn drawing(
     mesh: &TriMesh,
     classes: Option<&[[u8; 3]]>,

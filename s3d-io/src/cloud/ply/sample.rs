@@ -1,9 +1,8 @@
-//! Reads some of the points of a large cloud, and writes small ones.
+//! Reads some of the points of a large cloud.
 
 #![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
 
 use crate::error::{Error, Place, Result};
-use crate::fs::atomic::AtomicFile;
 use crate::fs::open::open_file;
 use s3d_geom::PointCloud;
 use s3d_geom::glam::Vec3;
@@ -95,50 +94,6 @@ fn middle_of_part(k: u64, parts: u64, count: u64) -> u64 {
         .saturating_mul(count)
         .checked_div(parts.saturating_mul(2));
     middle.and_then(|i| u64::try_from(i).ok()).unwrap_or(0)
-}
-
-/// Writes a cloud as a binary little-endian PLY file of positions (float), colours (uchar; black if it has
-/// none), and labels (int) if there are any. Viewers and Gaussian splatting read it. The file appears whole
-/// or not at all. Returns its size in bytes.
-///
-/// # Errors
-/// [`Error::Io`].
-///
-/// # Panics
-/// If the cloud has colours, or there are labels, but not one a point.
-pub fn write_colored_points(path: &Path, cloud: &PointCloud, labels: &[i32]) -> Result<u64> {
-    let n = cloud.len();
-    for (what, found) in [("colours", cloud.colors.len()), ("labels", labels.len())] {
-        assert!(found == 0 || found == n, "{found} {what} for {n} points");
-    }
-    let mut file = AtomicFile::create(path)?;
-    let header = format!(
-        "ply\n\
-         format binary_little_endian 1.0\n\
-         element vertex {n}\n\
-         property float x\n\
-         property float y\n\
-         property float z\n\
-         property uchar red\n\
-         property uchar green\n\
-         property uchar blue\n\
-         {}end_header\n",
-        if labels.is_empty() { "" } else { "property int label\n" }
-    );
-    file.put(header.as_bytes())?;
-
-    for (i, position) in cloud.positions.iter().enumerate() {
-        let mut point = [0; 15];
-        for (bytes, v) in point.as_chunks_mut().0.iter_mut().zip(position.to_array()) {
-            *bytes = v.to_le_bytes();
-        }
-        point[12..].copy_from_slice(cloud.colors.get(i).unwrap_or(&[0; 3]));
-        file.put(&point)?;
-        if let Some(label) = labels.get(i) {
-            file.put(&label.to_le_bytes())?;
-        }
-    }
-    file.commit()
 }
 
 /// Reads the header, and leaves `reader` at the first point.
@@ -270,15 +225,6 @@ mod tests {
             }
         }
         assert_eq!(read_point_sample(&path, 20_000).unwrap().positions, all.positions);
-    }
-
-    #[test]
-    fn a_sample_comes_back_from_a_file_of_its_own() {
-        let dir = tempfile::tempdir().unwrap();
-        let path = dir.path().join("cloud.ply");
-        let bytes = write_colored_points(&path, &cloud(300), &[]).unwrap();
-        assert_eq!(bytes, std::fs::metadata(&path).unwrap().len());
-        assert_eq!(read_point_sample(&path, 300).unwrap(), cloud(300));
     }
 
     #[test]

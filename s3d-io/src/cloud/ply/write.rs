@@ -74,12 +74,7 @@ impl<W: Write> PlyPointWriter<W> {
     /// # Errors
     /// [`Error::Io`].
     pub fn new_moved(mut file: W, name: &Path, count: u64, offset_m: DVec3) -> Result<Self> {
-        let frame = match offset_m.to_array() {
-            [0.0, 0.0, 0.0] => String::new(),
-            [x, y, z] => {
-                format!("comment offset_m {x:?} {y:?} {z:?}: add it for the scan's own coordinates\n")
-            }
-        };
+        let frame = frame_comment(offset_m);
 
         let header = format!(
             "ply\n\
@@ -148,6 +143,14 @@ impl<W: Write> PlyPointWriter<W> {
             return Err(Error::format(&self.name, message));
         }
         Ok(self.file)
+    }
+}
+
+/// The line of a header that tells what was subtracted from coordinates; empty for nothing.
+pub(super) fn frame_comment(offset_m: DVec3) -> String {
+    match offset_m.to_array() {
+        [0.0, 0.0, 0.0] => String::new(),
+        [x, y, z] => format!("comment offset_m {x:?} {y:?} {z:?}: add it for the scan's own coordinates\n"),
     }
 }
 

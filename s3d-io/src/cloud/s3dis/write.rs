@@ -232,55 +232,91 @@ pub fn write_s3dis_points(w: &mut dyn Write, positions: &[Vec3], colors: &[[u8; 
     w.write_all(&text)
 }
 
-/// Appends the line of a point, `x y z r g b`: the text of `{:.3}` and `{}`, written many times as fast.
-fn push_point(text: &mut Vec<u8>, position: Vec3, color: [u8; 3]) {
-    for coordinate in position.to_array() {
-        push_fixed3(text, coordinate);
-        text.push(b' ');
+/// Three digits of each number below a thousand, with leading zeros.
+///
+/// Points have millions of such numbers: copies from a table take less time than divisions.
+static DIGITS: [[u8; 3]; 1000] = {
+    let mut digits = [[0; 3]; 1000];
+    let mut i = 0;
+    while i < digits.len() {
+        digits[i] = [b'0' + (i / 100) as u8, b'0' + (i / 10 % 10) as u8, b'0' + (i % 10) as u8];
+        i += 1;
     }
-    let [r, g, b] = color;
-    push_integer(text, u64::from(r));
-    text.push(b' ');
-    push_integer(text, u64::from(g));
-    text.push(b' ');
-    push_integer(text, u64::from(b));
-    text.push(b'\n');
+    digits
+};
+
+/// The longest line that is put together: three signs, whole metres of up to twelve digits, decimals, colours.
+const LINE_BYTES: usize = 96;
+
+/// A line of text that is put together on the stack.
+struct Line {
+    bytes: [u8; LINE_BYTES],
+    len: usize,
 }
 
-/// Appends metres rounded to millimetres (halves away from zero), with three decimals and never "-0.000".
-fn push_fixed3(text: &mut Vec<u8>, metres: f32) {
-    let thousandths = (f64::from(metres) * 1000.0).round();
-    if thousandths.abs() >= 1e15 {
-        // Farther than any scan. A double does not hold every digit of such a number.
-        text.extend_from_slice(format!("{metres:.3}").as_bytes());
-        return;
-    }
-    let millimetres = thousandths as i64;
-    if millimetres < 0 {
-        text.push(b'-');
-    }
-    let magnitude = millimetres.unsigned_abs();
-    push_integer(text, magnitude / 1000);
-    let rest = (magnitude % 1000) as u16;
-    text.extend_from_slice(&[b'.', last_digit(rest / 100), last_digit(rest / 10), last_digit(rest)]);
-}
-
-fn last_digit(value: u16) -> u8 {
-    b'0' + (value % 10) as u8
-}
-
-fn push_integer(text: &mut Vec<u8>, mut value: u64) {
-    let mut digits = [0; 20];
-    let mut at = digits.len();
-    loop {
-        at -= 1;
-        digits[at] = b'0' + (value % 10) as u8;
-        value /= 10;
-        if value == 0 {
-            break;
+impl Line {
+    fn put<const N: usize>(&mut self, text: [u8; N]) {
+        if let Some(to) = self.bytes.get_mut(self.len..self.len + N) {
+            to.copy_from_slice(&text);
+            self.len += N;
         }
     }
-    text.extend_from_slice(&digits[at..]);
+
+    /// Appends a number below a thousand without leading zeros.
+    fn put_short(&mut self, number: usize) {
+        let digits = DIGITS[number % 1000];
+        match number {
+            100.. => self.put(digits),
+            10.. => self.put([digits[1], digits[2]]),
+            _ => self.put([digits[2]]),
+        }
+    }
+
+    fn put_integer(&mut self, number: u64) {
+        let below = (number % 1000) as usize;
+        if number < 1000 {
+            return self.put_short(below);
+        }
+        self.put_integer(number / 1000);
+        self.put(DIGITS[below]);
+    }
+
+    /// Appends metres rounded to millimetres (halves away from zero), with three decimals and never "-0.000".
+    /// They are less than a million kilometres, of which a double holds every digit.
+    fn put_metres(&mut self, metres: f32) {
+        let millimetres = (f64::from(metres) * 1000.0).round() as i64;
+        if millimetres < 0 {
+            self.put([b'-']);
+        }
+        let magnitude = millimetres.unsigned_abs();
+        self.put_integer(magnitude / 1000);
+        let [a, b, c] = DIGITS[(magnitude % 1000) as usize];
+        self.put([b'.', a, b, c]);
+    }
+}
+
+/// Appends the line of a point, `x y z r g b`: the text of `{:.3}` and `{}`, written many times as fast.
+fn push_point(text: &mut Vec<u8>, position: Vec3, color: [u8; 3]) {
+    let mut line = Line { bytes: [0; LINE_BYTES], len: 0 };
+    for coordinate in position.to_array() {
+        if coordinate.abs() < 1e9 {
+            line.put_metres(coordinate);
+        } else {
+            // Farther than any scan.
+            text.extend_from_slice(&line.bytes[..line.len]);
+            text.extend_from_slice(format!("{coordinate:.3}").as_bytes());
+            line.len = 0;
+        }
+        line.put([b' ']);
+    }
+    let [r, g, b] = color.map(usize::from);
+    line.put_short(r);
+    line.put([b' ']);
+    line.put_short(g);
+    line.put([b' ']);
+    line.put_short(b);
+    line.put([b'\n']);
+    text.extend_from_slice(&line.bytes[..line.len]);
 }
 
 #[cfg(test)]
@@ -291,8 +327,9 @@ mod tests {
 
     fn fixed3(metres: f32) -> String {
         let mut text = Vec::new();
-        push_fixed3(&mut text, metres);
-        String::from_utf8(text).unwrap()
+        push_point(&mut text, vec3(metres, 0.0, 0.0), [0; 3]);
+        let line = String::from_utf8(text).unwrap();
+        line.strip_suffix(" 0.000 0.000 0 0 0\n").unwrap().to_owned()
     }
 
     #[test]
@@ -310,6 +347,18 @@ mod tests {
         }
     }
 
+    #[test]
+    fn a_line_has_each_colour_and_the_farthest_numbers() {
+        for channel in 0..=255 {
+            let mut text = Vec::new();
+            push_point(&mut text, vec3(-999_999_936.0, 1e9, -3e38), [channel, 255 - channel, channel]);
+            let far = format!("{:.3}", -3e38_f32);
+            let expected =
+                format!("-999999936.000 1000000000.000 {far} {channel} {} {channel}\n", 255 - channel);
+            assert_eq!(String::from_utf8(text).unwrap(), expected);
+        }
+    }
+
     proptest! {
         #[test]
         fn fast_digits_are_those_of_the_formatter(
@@ -322,9 +371,10 @@ mod tests {
                 prop_assert_eq!(fixed3(metres), if plain == "-0.000" { "0.000" } else { &plain });
             }
 
-            let mut text = Vec::new();
-            push_integer(&mut text, u64::from(metres.to_bits()));
-            prop_assert_eq!(String::from_utf8(text).unwrap(), metres.to_bits().to_string());
+            let mut line = Line { bytes: [0; LINE_BYTES], len: 0 };
+            line.put_integer(u64::from(metres.to_bits()));
+            let digits = metres.to_bits().to_string();
+            prop_assert_eq!(&line.bytes[..line.len], digits.as_bytes());
         }
     }
 
