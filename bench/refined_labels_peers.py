@@ -60,7 +60,7 @@ def refined(labels, colors, peer):
     unary = unary_from_labels(index.reshape(-1), len(known), gt_prob=sure, zero_unsure=False)
     crf.setUnaryEnergy(np.ascontiguousarray(unary))
     crf.addPairwiseGaussian(sxy=place[0], compat=place[1])
-    crf.addPairwiseBilateral(sxy=look[0], srgb=look[1], rgbim=np.ascontiguousarray(colors), compat=look[2])
+    crf.addPairwiseBilateral(sxy=look[0], srgb=look[1], rgbim=colors.copy(), compat=look[2])
     best = np.argmax(crf.inference(5), axis=0).reshape(labels.shape)
     found = known[best]
     return np.where((labels == 0) | (labels == NONE), labels, found)
