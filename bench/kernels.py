@@ -40,7 +40,7 @@ def samples(binary, arguments):
     for line in text.splitlines():
         found = re.match(r"\s*(\d+)\s+(\S+)\s+\[(.)\]\s+(.+)$", line)
         if found:
-            count, binary, kind, name = found.groups()
+            count, _, kind, name = found.groups()
             name = KERNEL.sub(r"\2, \1", name.strip())
             counts[f"{SYSTEM}: {name}" if kind == "k" else name] += int(count)
     return counts

@@ -125,7 +125,7 @@ impl Scene {
     /// Kills an export as soon as a file of its folder is there. It begins from what `prepare` makes, again
     /// if it finished first.
     fn kill_when_there(&self, out: &Path, more: &[&str], name: &str, prepare: impl Fn()) {
-        loop {
+        for _ in 0..100 {
             prepare();
             let mut child = self.start(out, more);
             while !out.join(name).exists() && child.try_wait().unwrap().is_none() {
@@ -136,6 +136,7 @@ impl Scene {
                 return;
             }
         }
+        panic!("no export was killed while {name} was there");
     }
 }
 

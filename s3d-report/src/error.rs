@@ -1,6 +1,6 @@
 //! Why a report was not made.
 
-use crate::options::{MESH_FACES, PANO_WIDTHS, ReportOptions, THUMB_WIDTHS};
+use crate::options::{DPI, MESH_FACES, PANO_WIDTHS, ReportOptions, THUMB_WIDTHS};
 use std::path::PathBuf;
 use thiserror::Error as ThisError;
 
@@ -19,6 +19,9 @@ pub enum Error {
         THUMB_WIDTHS.end(), MESH_FACES.start(), MESH_FACES.end()
     )]
     OutOfRange(ReportOptions),
+    /// Figures have no such number of pixels an inch.
+    #[error("{} pixels an inch: {} to {} are possible", .0, DPI.start(), DPI.end())]
+    Resolution(u32),
     /// There is a file in the place of the report that is no report.
     #[error("{} is there already, and was not written by s3d report: choose another name", .0.display())]
     Occupied(PathBuf),

@@ -4,6 +4,8 @@ use crate::pixels::Widths;
 use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
+/// The pixels of an inch of a figure that are possible.
+pub(crate) const DPI: RangeInclusive<u32> = 30..=1200;
 /// The widths that panoramas may have, in pixels.
 pub(crate) const PANO_WIDTHS: RangeInclusive<u32> = 16..=16_384;
 /// The width of the sharpest colours of panoramas: all graphics cards have textures so wide.

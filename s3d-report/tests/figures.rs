@@ -51,6 +51,13 @@ fn pictures_have_as_many_pixels_an_inch_as_asked_for() {
         sum / pixels.pixels().len() as f64 / 3.0
     });
     assert!((means[0] - means[1]).abs() < 12.0, "the same picture: {means:?}");
+
+    for dpi in [0, 29, 1201, u32::MAX] {
+        let to = dir.path().join("none");
+        let options = FiguresOptions { dpi, ..FiguresOptions::default() };
+        let wrong = figures(&out, &to, &options, &Context::default()).unwrap_err();
+        assert!(matches!(wrong, Error::Resolution(_)) && !to.exists(), "{wrong}");
+    }
 }
 
 fn png(folder: &Path, name: &str) -> Raster<[u8; 3]> {

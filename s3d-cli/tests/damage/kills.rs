@@ -272,7 +272,7 @@ fn kill_each<'a>(commands: impl Iterator<Item = (usize, &'a &'static str)>) {
                 let started = Instant::now();
                 let status = run(&folder, command, delay);
                 if status.success() {
-                    // Nor would any kill come before the end on one that has become faster.
+                    // On one that has become faster, kills by the first time would come after the end.
                     if kills == before {
                         took = took.min(started.elapsed());
                     }

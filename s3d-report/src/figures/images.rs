@@ -100,8 +100,8 @@ impl<'a> Images<'a> {
         Ok(Picture { pixels, is_photo: look == Look::Colors })
     }
 
-    /// Returns the colours of an image, and what is of another class than this one pale, drawn as wide as
-    /// [`Images::picture`].
+    /// Returns the colours of an image as a picture that is drawn this wide, in points. Pixels of other
+    /// classes than this one are pale.
     ///
     /// # Errors
     /// As [`Images::picture`].

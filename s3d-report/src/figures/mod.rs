@@ -17,6 +17,7 @@ mod samples;
 mod sheet;
 
 use crate::error::{Error, Result};
+use crate::options::DPI;
 use images::Images;
 use s3d_dataset::store::{FolderKind, NewFolder};
 use s3d_dataset::{Context, DataSet};
@@ -167,11 +168,14 @@ struct About {
 /// entropy of classes. The same data set gives the same bytes.
 ///
 /// # Errors
-/// [`Error::NoFigure`] if there is nothing to draw. [`Error::Dataset`] if there is no finished data set in
+/// [`Error::Resolution`] for [`FiguresOptions::dpi`]. [`Error::NoFigure`] if there is nothing to draw. [`Error::Dataset`] if there is no finished data set in
 /// `out`, a file of it or the list of detections is damaged, or `to` cannot be written, or is there and not
 /// to be replaced.
 pub fn figures(out: &Path, to: &Path, options: &FiguresOptions, ctx: &Context) -> Result<()> {
     let FiguresOptions { dpi, detections, overwrite } = options;
+    if !DPI.contains(dpi) {
+        return Err(Error::Resolution(*dpi));
+    }
     let data = DataSet::open(out)?;
     let found = detections.as_deref().map(detections::read).transpose()?;
     let folder = NewFolder::begin(ctx, to, out, FIGURES, *overwrite)?;

@@ -1,7 +1,7 @@
 //! Writes clouds of positions and colours.
 
-use super::write::frame_comment;
-use crate::error::{Error, Result};
+use super::write::{check_count, frame_comment};
+use crate::error::Result;
 use crate::fs::atomic::AtomicFile;
 use s3d_geom::PointCloud;
 use s3d_geom::glam::DVec3;
@@ -23,7 +23,7 @@ impl ColoredPointWriter {
     /// header says so, unless the offset is 0.
     ///
     /// # Errors
-    /// [`Error::Io`].
+    /// [`Error::Io`](crate::Error::Io).
     pub fn create(path: &Path, count: u64, offset_m: DVec3) -> Result<Self> {
         Self::begin(path, count, offset_m, "")
     }
@@ -50,7 +50,7 @@ impl ColoredPointWriter {
     /// Appends points.
     ///
     /// # Errors
-    /// [`Error::Io`].
+    /// [`Error::Io`](crate::Error::Io).
     ///
     /// # Panics
     /// If the cloud has colours, but not one a point.
@@ -81,13 +81,10 @@ impl ColoredPointWriter {
     /// Gives the file its name, and returns its size in bytes.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Format`] if fewer or more points came than were promised. There is no file
+    /// [`Error::Io`](crate::Error::Io); [`Error::Format`](crate::Error::Format) if fewer or more points came than were promised. There is no file
     /// then.
     pub fn finish(self) -> Result<u64> {
-        if self.written != self.promised {
-            let message = format!("{} points were promised, {} came", self.promised, self.written);
-            return Err(Error::format(&self.path, message));
-        }
+        check_count(&self.path, self.promised, self.written)?;
         self.file.commit()
     }
 }
@@ -96,7 +93,7 @@ impl ColoredPointWriter {
 /// in bytes.
 ///
 /// # Errors
-/// [`Error::Io`].
+/// [`Error::Io`](crate::Error::Io).
 ///
 /// # Panics
 /// If the cloud has colours, or there are labels, but not one a point.

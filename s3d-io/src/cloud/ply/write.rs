@@ -138,12 +138,17 @@ impl<W: Write> PlyPointWriter<W> {
     /// # Errors
     /// [`Error::Io`]; [`Error::Format`] if fewer or more points came than were promised.
     pub fn into_inner(self) -> Result<W> {
-        if self.written != self.promised {
-            let message = format!("{} points were promised, {} came", self.promised, self.written);
-            return Err(Error::format(&self.name, message));
-        }
+        check_count(&self.name, self.promised, self.written)?;
         Ok(self.file)
     }
+}
+
+/// Fails unless as many points were written to the file `name` as its header says.
+pub(super) fn check_count(name: &Path, promised: u64, written: u64) -> Result<()> {
+    if written == promised {
+        return Ok(());
+    }
+    Err(Error::format(name, format!("{promised} points were promised, {written} came")))
 }
 
 /// The line of a header that tells what was subtracted from coordinates; empty for nothing.

@@ -245,8 +245,8 @@ static DIGITS: [[u8; 3]; 1000] = {
     digits
 };
 
-/// The longest line that is put together: three signs, whole metres of up to twelve digits, decimals, colours.
-const LINE_BYTES: usize = 96;
+/// Room for the longest line: three coordinates of a sign, nine digits and three decimals, and the colours.
+const LINE_BYTES: usize = 64;
 
 /// A line of text that is put together on the stack.
 struct Line {
@@ -282,7 +282,7 @@ impl Line {
     }
 
     /// Appends metres rounded to millimetres (halves away from zero), with three decimals and never "-0.000".
-    /// They are less than a million kilometres, of which a double holds every digit.
+    /// They are fewer than 10⁹, so a double holds every digit.
     fn put_metres(&mut self, metres: f32) {
         let millimetres = (f64::from(metres) * 1000.0).round() as i64;
         if millimetres < 0 {
