@@ -69,6 +69,7 @@ pub(crate) enum Command {
             "  s3d export scan.glb -o dataset\n",
             "  s3d export area_1.toml area_2.toml -o dataset --seed 7 --views 24 --size 512\n",
             "  s3d export scan/scene.toml --modalities rgb,depth,pose --keep-all\n",
+            "  s3d export scan/scene.toml --to webdataset -o shards\n",
             "Call an export that was stopped or killed again with the same arguments: ",
             "it goes on where it was.",
         )

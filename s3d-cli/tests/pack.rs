@@ -15,24 +15,22 @@ fn dataset() -> &'static Path {
         let dir = tempfile::tempdir().unwrap();
         let scenes = [1, 2].map(|area| write_scan(&dir.path().join(format!("scan_{area}")), area));
         let out = dir.path().join("dataset");
-        s3d_ok(&[
-            "export",
-            text(&scenes[0]),
-            text(&scenes[1]),
-            "-o",
-            text(&out),
-            "--views",
-            "6",
-            "--size",
-            "48",
-            "--pano-width",
-            "64",
-            "--points-per-m2",
-            "100",
-        ]);
+        let call = ["export", text(&scenes[0]), text(&scenes[1]), "-o", text(&out)];
+        s3d_ok(&[&call[..], &SMALL].concat());
         (dir, out)
     });
     out
+}
+
+const SMALL: [&str; 8] = ["--views", "6", "--size", "48", "--pano-width", "64", "--points-per-m2", "100"];
+
+/// Exports the scenes of [`dataset`] with these arguments.
+fn export_call<'a>(scenes: &'a [PathBuf; 2], more: &[&'a str]) -> Vec<&'a str> {
+    [&["export", text(&scenes[0]), text(&scenes[1])], more, &SMALL].concat()
+}
+
+fn scenes() -> [PathBuf; 2] {
+    [1, 2].map(|area| dataset().with_file_name(format!("scan_{area}")).join("scene.toml"))
 }
 
 const KINDS: [&str; 14] = [
@@ -98,6 +96,42 @@ fn the_same_bytes_for_any_number_of_threads_and_nothing_altered() {
         assert_eq!(fs::read_dir(a.path()).unwrap().count(), 1, "{kind} leaves nothing beside the package");
     }
     assert_eq!(files(dataset()), before);
+}
+
+#[test]
+fn scenes_are_packed_like_their_data_set() {
+    let scenes = scenes();
+    for kind in ["webdataset", "huggingface", "dust3r", "wai", "vggt"] {
+        let (a, b) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        let place = b.path().join("package");
+        s3d_ok(&export_call(&scenes, &["--to", kind, "-o", text(&place)]));
+        let (expected, found) = (pack(a.path(), kind, &[]), files(&place));
+        assert!(expected.keys().eq(found.keys()), "{kind}");
+        for (path, bytes) in &expected {
+            assert!(*bytes == found[path], "{kind}: {path:?}");
+        }
+        assert_eq!(fs::read_dir(b.path()).unwrap().count(), 1, "{kind} leaves nothing beside the package");
+    }
+}
+
+#[test]
+fn scenes_that_cannot_be_packed_are_told_before_the_work() {
+    let scenes = scenes();
+    let dir = tempfile::tempdir().unwrap();
+    let place = dir.path().join("package");
+    let inside = scenes[0].with_file_name("package");
+    for (more, expected) in [
+        (&["--to", "coco"][..], "call `s3d pack`"),
+        (&["--to", "dust3r", "--modalities", "rgb,depth"], "--modalities rgb,depth: DUSt3R needs pose"),
+        (&["--to", "webdataset", "--profile", "pointnet"], "--profile pointnet"),
+        (&["--to", "webdataset", "--shard", "1/2"], "cannot be used with"),
+    ] {
+        let more = [more, &["-o", text(&place)]].concat();
+        s3d_fails(&export_call(&scenes, &more), 2, &[expected]);
+    }
+    let folder = text(scenes[0].parent().unwrap());
+    s3d_fails(&["export", folder, "--to", "webdataset", "-o", text(&inside)], 2, &["in one another"]);
+    assert!(!inside.exists() && fs::read_dir(dir.path()).unwrap().next().is_none());
 }
 
 #[test]

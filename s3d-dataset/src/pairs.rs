@@ -169,7 +169,7 @@ fn camera_of(data: &DataSet, image: &DatasetImage) -> Result<Camera> {
         return Err(FileError::format(&image.path(&data.layout, Domain::Pose), message).into());
     }
     let options = &data.manifest.options;
-    let size = match (image.size(&data.layout)?, image.frame) {
+    let size = match (data.size_of(image)?, image.frame) {
         (Some((width, height)), _) => [width, height],
         (None, Frame::View(_)) => [options.size; 2],
         (None, Frame::Panorama) => [options.pano_width, options.pano_width / 2],

@@ -13,10 +13,10 @@ use s3d_io::Error as FileError;
 use s3d_io::cloud::LabelledPoints;
 use s3d_io::dataset::{
     DatasetImage, Domain, FaceVoteColumns, Frame, InstanceEntry, Layout, ObjectsFile, PairColumns, PointBox,
-    PoseFile, SourceFaces, ViewRecord, read_face_votes, read_instances, read_labels, read_objects,
-    read_pairs, read_point_boxes, read_pose, read_source_faces, read_views,
+    PoseFile, SourceFaces, ViewRecord, read_face_votes, read_instances, read_labels, read_pairs,
+    read_point_boxes, read_source_faces, read_views,
 };
-use s3d_io::fs::read_json;
+use s3d_io::fs::{parse_json, read_json};
 use s3d_io::mesh::{MeshFile, UpAxis, read_mesh};
 use s3d_label::{LabelTable, Taxonomy};
 use serde::Serialize;
@@ -296,12 +296,24 @@ impl DataSet {
         Ok(read_views(self.files.checked(&path)?)?)
     }
 
+    /// Returns width and height of an image in pixels, from the head of its first PNG file. Returns `None` if
+    /// it has none.
+    ///
+    /// # Errors
+    /// [`Error::File`](crate::Error::File).
+    pub fn size_of(&self, image: &DatasetImage) -> Result<Option<(u32, u32)>> {
+        let first = image.domains.iter().find(|domain| domain.extension() == "png");
+        let size = first.map(|domain| self.files.png_size(&image.path(self.layout(), *domain)));
+        Ok(size.transpose()?)
+    }
+
     /// Returns the pose of an image.
     ///
     /// # Errors
     /// [`Error::File`](crate::Error::File).
     pub fn pose(&self, image: &DatasetImage) -> Result<PoseFile> {
-        Ok(read_pose(self.files.checked(&image.path(self.layout(), Domain::Pose))?)?)
+        let path = image.path(self.layout(), Domain::Pose);
+        Ok(parse_json(&path, &self.files.read_bytes(&path)?)?)
     }
 
     /// Returns the objects of an image.
@@ -309,7 +321,8 @@ impl DataSet {
     /// # Errors
     /// [`Error::File`](crate::Error::File), also if the image has none.
     pub fn objects(&self, image: &DatasetImage) -> Result<ObjectsFile> {
-        Ok(read_objects(self.files.checked(&image.path(self.layout(), Domain::Objects))?)?)
+        let path = image.path(self.layout(), Domain::Objects);
+        Ok(parse_json(&path, &self.files.read_bytes(&path)?)?)
     }
 
     /// Returns the pairs of images of an area that see the same surface. Returns `None` if they were not

@@ -159,7 +159,13 @@ impl Summary {
             .map(|(stage, s)| format!("{} {s:.1} s", stage.name()))
             .collect();
         if !stages.is_empty() {
-            lines.push(format!("{} (meshes and points are written beside the images)", stages.join(", ")));
+            let has_meshes = self.stage_seconds.contains_key(&Stage::Meshes);
+            let beside = if has_meshes {
+                " (meshes and points are written beside the images)"
+            } else {
+                ""
+            };
+            lines.push(format!("{}{beside}", stages.join(", ")));
         }
 
         let missing: Vec<String> = [("panoramas", tally.panoramas), ("views", tally.views)]

@@ -249,9 +249,7 @@ impl DataSet {
     /// Width and height in pixels.
     fn size(&self, py: Python<'_>, image: usize) -> PyResult<(u32, u32)> {
         let image = self.image(image)?;
-        let size = py
-            .detach(|| image.size(self.data.layout()))
-            .map_err(|e| exception(&e.into()))?;
+        let size = py.detach(|| self.data.size_of(image)).map_err(|e| exception(&e))?;
         size.ok_or_else(|| usage(format!("{} has no PNG file that tells its size", image.stem())))
     }
 

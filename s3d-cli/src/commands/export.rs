@@ -6,9 +6,10 @@ use crate::failure::{Failure, Outcome};
 use crate::values::parsed;
 use clap::Args;
 use s3d_dataset::export::Shard;
+use s3d_dataset::pack::{PackageArguments, PackageKind, default_output, pack_scenes};
 use s3d_dataset::{Export, ExportOptions};
 use s3d_io::dataset::Domain;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 #[derive(Debug, Args)]
 pub(crate) struct ExportArgs {
@@ -31,6 +32,11 @@ pub(crate) struct ExportArgs {
     /// Find the images that see the same surface, too, as `s3d pairs OUT` does.
     #[arg(long, conflicts_with = "shard")]
     pub(crate) pairs: bool,
+    /// Write a package to OUT in place of a data set, as `s3d pack` does, without millions of small files on
+    /// the way [default of OUT: SCENE_2d3ds_KIND]
+    #[arg(long, value_name = "webdataset|huggingface|dust3r|wai|vggt", value_parser = parsed::<PackageKind>,
+        conflicts_with_all = ["pairs", "shard"])]
+    pub(crate) to: Option<PackageKind>,
     #[command(flatten)]
     pub(crate) options: ExportOptions,
     #[command(flatten)]
@@ -41,26 +47,25 @@ pub(crate) fn run(args: ExportArgs) -> Outcome<()> {
     if args.pairs && !args.options.modalities.contains(&Domain::Pose) {
         return Err(Failure::Usage("--pairs needs poses: add pose to --modalities".to_owned()));
     }
-    let output = args.output.unwrap_or_else(|| default_output(&args.scenes.scenes[0]));
+    let output = args
+        .output
+        .unwrap_or_else(|| default_output(&args.scenes.scenes[0], args.to));
     let export = Export::new(args.scenes.sources())
         .options(args.options)
         .overwrite(args.overwrite)
         .shard(args.shard)
         .plan(args.plan);
     on_threads(args.threads, |context| {
+        if let Some(kind) = args.to {
+            let package = PackageArguments::default().package(kind)?;
+            return pack_scenes(&export, &package, &output, args.overwrite, context).map(drop);
+        }
         export.run(&output, context)?;
         if args.pairs {
             s3d_dataset::pairs::missing_pairs(&output, context)?;
         }
         Ok(())
     })
-}
-
-/// The default folder of the data set: beside the scene file, named after it.
-fn default_output(scene: &Path) -> PathBuf {
-    let mut name = scene.file_stem().unwrap_or("scene".as_ref()).to_owned();
-    name.push("_2d3ds");
-    scene.with_file_name(name)
 }
 
 #[cfg(test)]
@@ -87,11 +92,5 @@ mod tests {
         for name in names {
             assert!(help.contains(&name), "{name}");
         }
-    }
-
-    #[test]
-    fn the_default_lies_beside_the_scene() {
-        assert_eq!(default_output(Path::new("a/scan.toml")), Path::new("a/scan_2d3ds"));
-        assert_eq!(default_output(Path::new("scene.toml")), Path::new("scene_2d3ds"));
     }
 }

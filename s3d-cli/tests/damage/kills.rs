@@ -20,11 +20,13 @@ use tempfile::TempDir;
 
 /// The commands, called in a folder with `scan` (the input), `out` (an export) and `shard_1`, `shard_2` (its
 /// shards). A new command that writes needs a line here.
-const COMMANDS: [&str; 51] = [
+const COMMANDS: [&str; 53] = [
     "export scan/scene.toml -o new SMALL",
     "export scan/scene.toml -o out SMALL --seed 7 --overwrite",
     "export scan/scene.toml -o new SMALL --profile pointcept,open3d-ml",
     "export scan/photographs.toml -o new SMALL --place-cameras 2",
+    "export scan/scene.toml --to webdataset -o new SMALL",
+    "export scan/photographs.toml --to huggingface -o new SMALL --place-cameras 2",
     "plan scan/scene.toml -o new --views 3 --size 32",
     "merge shard_1 shard_2 -o new",
     "demo -o new --views 1 --size 32 --pano-width 64 --points-per-m2 5",

@@ -138,7 +138,7 @@ pub(crate) fn render_area(
     todo: &BTreeSet<&Unit>,
 ) -> Result<()> {
     let ctx = common.account.ctx;
-    let Common { layout, options, journal, account, .. } = common;
+    let Common { layout, options, journal, account, form, .. } = common;
     let LabelledArea { annotated, locations, location_rooms, .. } = plan;
     let PreparedMesh { file, scene } = prepared;
     let number = area.number;
@@ -221,6 +221,7 @@ pub(crate) fn render_area(
         chosen: &chosen,
         photographs: &photographs,
         modalities: &options.modalities,
+        is_bundled: form.is_bundled(),
         size: options.size,
         pano_width: options.pano_width,
         offset_m: area.frame.offset(),

@@ -11,6 +11,29 @@ use s3d_label::LabelTable;
 use s3d_render::Scene;
 use std::path::{Path, PathBuf};
 
+/// The form in which an export writes its images, and whether it writes the rest.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Form {
+    /// A data set: a file for each image, with meshes and points.
+    #[default]
+    DataSet,
+    /// What a package is made from: a bundle for each scan location and photograph. Meshes and points only if
+    /// the package needs them.
+    Bundles { with_meshes: bool },
+}
+
+impl Form {
+    /// Whether images lie in bundles.
+    pub(crate) fn is_bundled(self) -> bool {
+        self != Self::DataSet
+    }
+
+    /// Whether a unit is part of it.
+    pub(crate) fn has(self, unit: &Unit) -> bool {
+        self != Self::Bundles { with_meshes: false } || !matches!(unit, Unit::Assets(_))
+    }
+}
+
 /// What all areas share.
 #[derive(Clone, Copy)]
 pub(crate) struct Common<'a> {
@@ -25,6 +48,7 @@ pub(crate) struct Common<'a> {
     pub(crate) is_ours: &'a (dyn Fn(&Unit) -> bool + Sync),
     /// The input files as they were when they were looked at first.
     pub(crate) stamps: &'a Stamps,
+    pub(crate) form: Form,
 }
 
 impl Common<'_> {

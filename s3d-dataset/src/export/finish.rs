@@ -59,21 +59,8 @@ pub(crate) fn finish(
     }
 
     let areas = request.numbers();
-    let (candidates, views) = select_requested(request, finished)?;
-
-    let mut entries = Vec::new();
-    let mut locations = 0;
-    let mut all_unlabelled: Option<Unlabelled> = None;
-    for requested in &request.areas {
-        tables::write_views(layout, requested.area, &candidates)?;
-        let Some(labels) = finished.labels(requested.area) else { continue };
-        let entry = finish_area(ctx, layout, request, finished, requested, labels)?;
-        locations += labels.locations.len();
-        if let Some(of) = entry.unlabelled {
-            *all_unlabelled.get_or_insert_default() += of;
-        }
-        entries.push(entry);
-    }
+    let FinishedAreas { entries, locations, views, unlabelled } =
+        finish_areas(ctx, layout, request, finished)?;
 
     let mut files = Vec::new();
     for done in finished.iter().filter(|done| areas.contains(&done.unit().area())) {
@@ -108,13 +95,38 @@ pub(crate) fn finish(
     sync_file(&layout.manifest())?;
 
     let own = [layout.file_list(), layout.manifest()].map(|p| fs::metadata(p).map_or(0, |found| found.len()));
-    Ok(Totals {
-        files: count + 2,
-        bytes: listed + own.iter().sum::<u64>(),
-        locations,
-        views,
-        unlabelled: all_unlabelled,
-    })
+    Ok(Totals { files: count + 2, bytes: listed + own.iter().sum::<u64>(), locations, views, unlabelled })
+}
+
+/// What is known of all areas once their units are done.
+pub(crate) struct FinishedAreas {
+    /// The manifest's.
+    pub(crate) entries: Vec<AreaEntry>,
+    pub(crate) locations: usize,
+    pub(crate) views: ViewTally,
+    pub(crate) unlabelled: Option<Unlabelled>,
+}
+
+/// Writes the tables of each area, and warns of what is odd about its images.
+pub(crate) fn finish_areas(
+    ctx: &Context,
+    layout: &Layout,
+    request: &Request,
+    finished: &Finished,
+) -> Result<FinishedAreas> {
+    let (candidates, views) = select_requested(request, finished)?;
+    let mut of_all = FinishedAreas { entries: Vec::new(), locations: 0, views, unlabelled: None };
+    for requested in &request.areas {
+        tables::write_views(layout, requested.area, &candidates)?;
+        let Some(labels) = finished.labels(requested.area) else { continue };
+        let entry = finish_area(ctx, layout, request, finished, requested, labels)?;
+        of_all.locations += labels.locations.len();
+        if let Some(of) = entry.unlabelled {
+            *of_all.unlabelled.get_or_insert_default() += of;
+        }
+        of_all.entries.push(entry);
+    }
+    Ok(of_all)
 }
 
 /// Writes the list of an area's photographs, warns of what is odd about its images, and returns its entry in

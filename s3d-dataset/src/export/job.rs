@@ -5,7 +5,7 @@ use crate::account::Account;
 use crate::context::Context;
 use crate::error::{InputError, Result, UsageError};
 use crate::export::area;
-use crate::export::common::{Common, PreparedMesh};
+use crate::export::common::{Common, Form, PreparedMesh};
 use crate::export::finish::finish;
 use crate::export::input::Inputs;
 use crate::export::input::area::AreaInput;
@@ -21,7 +21,7 @@ use crate::export::scoring;
 use crate::export::views::select_requested;
 use crate::options::ExportOptions;
 use crate::record::assets;
-use crate::record::journal::{Journal, Unit};
+use crate::record::journal::{Finished, Journal, Unit};
 use crate::record::manifest::Manifest;
 use crate::record::request::Request;
 use crate::record::unfinished::missing_units;
@@ -56,6 +56,7 @@ pub(crate) struct Job<'a> {
     pub(crate) plan: Option<&'a Plan>,
     /// The input files as they were when they were looked at first.
     stamps: Stamps,
+    form: Form,
 }
 
 /// What is known after labelling. An area is `None` if all its units were done before.
@@ -86,7 +87,7 @@ pub(crate) fn export(
     let state = run.look()?;
     let job = Job::open(scenes, layout, &state, options, plan, &run.account)?;
     if !state.is_begun() {
-        judge(ctx, &space_findings(job.estimate.bytes, layout.root()), &options.allow)?;
+        job.judge_space(ctx, layout, 1.0)?;
     }
 
     let manifest = job.manifest();
@@ -94,7 +95,10 @@ pub(crate) fn export(
         return Ok(None);
     };
 
-    let made = job.run(layout, &session.journal, &run.account).and_then(|disk| {
+    // Written files are synced to the disk while others are made.
+    let disk = SyncAhead::start(layout.root());
+    let made = job.run(layout, &session.journal, &run.account).and_then(|()| {
+        disk.sync_now();
         let tables = run.account.stage(Stage::Tables, None);
         let made = finish(ctx, layout, &job.request, manifest, &session.journal.finished(), Some(disk))?;
         tables.end();
@@ -174,7 +178,17 @@ impl<'a> Job<'a> {
         loading.end();
         ctx.check()?;
         ctx.debug(format_args!("the data set will have {estimate}"));
-        Ok(Self { estimate, inputs, request, options: options.clone(), pictures, single, plan, stamps })
+        Ok(Self {
+            estimate,
+            inputs,
+            request,
+            options: options.clone(),
+            pictures,
+            single,
+            plan,
+            stamps,
+            form: Form::DataSet,
+        })
     }
 
     /// Returns the manifest of an export under way.
@@ -182,11 +196,16 @@ impl<'a> Job<'a> {
         Manifest::begin(&self.request, &self.inputs.table)
     }
 
-    /// Does all units that are not done yet. Written files are synced to the disk meanwhile. Returns that
-    /// work, which goes on afterwards.
-    fn run(&self, layout: &Layout, journal: &Journal, account: &Account<'_>) -> Result<SyncAhead> {
+    /// Returns the known units that are not done yet.
+    fn missing(&self, finished: &Finished) -> Vec<Unit> {
+        let mut missing = missing_units(&self.request, finished);
+        missing.retain(|unit| self.form.has(unit));
+        missing
+    }
+
+    /// Does all units that are not done yet.
+    pub(crate) fn run(&self, layout: &Layout, journal: &Journal, account: &Account<'_>) -> Result<()> {
         let ctx = account.ctx;
-        let disk = SyncAhead::start(layout.root());
         self.write_assets(layout)?;
 
         let cache = layout.work_dir();
@@ -197,9 +216,18 @@ impl<'a> Job<'a> {
         let kept = candidates.iter().filter(|c| c.frame_num.is_some()).count();
         ctx.info(format_args!("selected {kept} of {} candidate views", candidates.len()));
 
-        self.render(common, &labelled, &candidates)?;
-        disk.sync_now();
-        Ok(disk)
+        self.render(common, &labelled, &candidates)
+    }
+
+    /// Returns the job whose images go into bundles.
+    pub(crate) fn bundled(self, with_meshes: bool) -> Self {
+        Self { form: Form::Bundles { with_meshes }, ..self }
+    }
+
+    /// Weighs whether the disk below `layout` has room for `copies` of what is written.
+    pub(crate) fn judge_space(&self, ctx: &Context, layout: &Layout, copies: f64) -> Result<()> {
+        let bytes = copies * self.estimate.bytes;
+        judge(ctx, &space_findings(bytes, layout.root()), &self.options.allow)
     }
 
     /// Writes what is known before any unit is done: the label table, `assets`, `conventions.json`.
@@ -225,13 +253,14 @@ impl<'a> Job<'a> {
     ) -> Common<'b> {
         let table = &self.inputs.table;
         let options = &self.options;
-        Common { table, layout, options, journal, account, cache, is_ours, stamps: &self.stamps }
+        let Self { stamps, form, .. } = self;
+        Common { table, layout, options, journal, account, cache, is_ours, stamps, form: *form }
     }
 
     /// Labels the areas of `scope`, and scores their unscored locations. The label files of an area are
     /// written if that unit is ours. Otherwise the journal knows the unit, but does not write it down.
     pub(crate) fn label(&self, common: Common<'_>, scope: Scope) -> Result<Labelled<'_>> {
-        let missing = missing_units(&self.request, &common.journal.finished());
+        let missing = self.missing(&common.journal.finished());
         let mut labelled = Labelled { single: None, areas: Vec::new() };
         for area in &self.inputs.areas {
             let is_needed = scope == Scope::All || missing.iter().any(|unit| unit.area() == area.number);
@@ -314,7 +343,7 @@ impl<'a> Job<'a> {
         labelled: &Labelled<'_>,
         candidates: &[Candidate],
     ) -> Result<()> {
-        let missing = missing_units(&self.request, &common.journal.finished());
+        let missing = self.missing(&common.journal.finished());
         let Labelled { single, areas } = labelled;
 
         for ((area, plan), pictures) in self.inputs.areas.iter().zip(areas).zip(&self.pictures) {

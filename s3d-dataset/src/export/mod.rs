@@ -7,6 +7,7 @@
 // and `finish.rs` writes what belongs to the whole.
 
 pub(crate) mod area;
+pub(crate) mod bundled;
 pub(crate) mod common;
 pub(crate) mod cues;
 pub(crate) mod finish;
@@ -30,13 +31,16 @@ pub use shard::assignment::Shard;
 
 use crate::context::Context;
 use crate::error::{Result, UsageError};
+use crate::export::bundled::{PackageJob, export_bundled};
 use crate::export::plan::Plan;
 use crate::export::shard::export_shard;
 use crate::options::ExportOptions;
+use crate::record::data_set::DataSet;
+use crate::store::new_folder::check_apart;
 use crate::summary::Summary;
 use job::export;
 use run::{Run, Target};
-use s3d_io::dataset::Layout;
+use s3d_io::dataset::{Domain, Layout};
 use std::path::{Path, PathBuf};
 
 /// An export, which turns scenes into a data set. See the crate's page for an example.
@@ -99,6 +103,67 @@ impl Export {
         Run::new(ctx, &self.target(output.into())).look().map(drop)
     }
 
+    /// Returns the export of only the modalities that `is_used` tells of.
+    pub(crate) fn keeping(&self, is_used: impl Fn(Domain) -> bool) -> Self {
+        let mut kept = self.clone();
+        kept.options.modalities.retain(|domain| is_used(*domain));
+        kept
+    }
+
+    /// Refuses what cannot end in a package for `whom` at `place`: an export without the `required`
+    /// modalities, a part of one, or one with profiles; a place in its input, or around it.
+    pub(crate) fn check_packable(&self, required: &[Domain], whom: &str, place: &Path) -> Result<()> {
+        let invalid = |option, value: String, why: &str| {
+            let why = why.to_owned();
+            Err(UsageError::InvalidValue { option, value, why }.into())
+        };
+        let ExportOptions { modalities, profiles, .. } = &self.options;
+        if let Some(missing) = required.iter().find(|domain| !modalities.contains(domain)) {
+            return invalid("modalities", joined(modalities), &format!("{whom} needs {missing}"));
+        }
+        if let Some(shard) = self.shard {
+            let why = "a package is made whole: export the shards, merge them, and pack the data set";
+            return invalid("shard", shard.to_string(), why);
+        }
+        if !profiles.is_empty() {
+            let why = "profiles are files of a data set: export one, and pack it";
+            return invalid("profiles", joined(profiles), why);
+        }
+
+        for scene in &self.scenes {
+            let paths = match scene {
+                SceneSource::Path(path) => std::slice::from_ref(path),
+                SceneSource::Meshes { paths, .. } => paths,
+                SceneSource::Memory(_) => &[],
+            };
+            paths.iter().try_for_each(|path| check_apart(place, path))?;
+        }
+        Ok(())
+    }
+
+    /// Makes a package: see [`export_bundled`]. The work goes on in the folder `work`, which holds nothing
+    /// else.
+    pub(crate) fn run_bundled<F: FnOnce() -> Result<(u64, u64)>>(
+        &self,
+        work: PathBuf,
+        package: PackageJob<'_, impl FnOnce(DataSet) -> Result<F>>,
+        ctx: &Context,
+    ) -> Result<Summary> {
+        let (options, plan) = self.checked(ctx)?;
+        let target = Target { layout: Layout::new(work), overwrite: true, allowed: Vec::new() };
+        export_bundled(&self.scenes, &target, &options, plan.as_ref(), package, ctx)
+    }
+
+    /// Returns the options as they are stored, and the plan.
+    fn checked(&self, ctx: &Context) -> Result<(ExportOptions, Option<Plan>)> {
+        if self.scenes.is_empty() {
+            return Err(UsageError::NoScenes.into());
+        }
+        let options = self.options.canonical()?;
+        let plan = self.plan.as_deref().map(|folder| Plan::open(ctx, folder)).transpose()?;
+        Ok((options, plan))
+    }
+
     fn target(&self, output: PathBuf) -> Target<'_> {
         let allowed = self.allowed.iter().map(String::as_str).collect();
         Target { layout: Layout::new(output), overwrite: self.overwrite, allowed }
@@ -116,15 +181,16 @@ impl Export {
     /// [`Input`](crate::Error::Input) or [`File`](crate::Error::File) if the input is wrong;
     /// [`Cancelled`](crate::Error::Cancelled); [`Temporary`](crate::Error::Temporary).
     pub fn run(&self, output: impl Into<PathBuf>, ctx: &Context) -> Result<Option<Summary>> {
-        if self.scenes.is_empty() {
-            return Err(UsageError::NoScenes.into());
-        }
-        let options = self.options.canonical()?;
-        let plan = self.plan.as_deref().map(|folder| Plan::open(ctx, folder)).transpose()?;
+        let (options, plan) = self.checked(ctx)?;
         let target = self.target(output.into());
         match self.shard {
             Some(shard) => export_shard(ctx, &self.scenes, &target, &options, shard, plan.as_ref()),
             None => export(ctx, &self.scenes, &target, &options, plan.as_ref()),
         }
     }
+}
+
+/// Returns the words of options, with commas.
+fn joined<T: ToString>(values: &[T]) -> String {
+    values.iter().map(T::to_string).collect::<Vec<_>>().join(",")
 }

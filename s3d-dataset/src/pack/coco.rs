@@ -32,7 +32,7 @@ pub(super) fn pack(
     destination: &Destination,
     options: &CocoOptions,
 ) -> Result<Vec<String>> {
-    let Some(table) = source.labels()? else {
+    let Some(table) = source.data.labels()? else {
         let dataset = source.data.layout.root().to_owned();
         return Err(InputError::WithoutLabels { dataset, needs: "COCO needs" }.into());
     };

@@ -40,7 +40,7 @@ pub(super) fn pack(
             &images,
             || (),
             |(), image| {
-                let pose = source.pose(image)?;
+                let pose = source.data.pose(image)?;
                 let (width, height) = source.size(image)?;
                 let name = format!("{}_domain_rgb.png", image.stem());
                 if options.copy_images {

@@ -6,7 +6,7 @@ use crate::store::new_folder::{FolderKind, NewFolder};
 use s3d_io::fs::write_json;
 use serde::{Deserialize, Serialize};
 use std::ffi::OsString;
-use std::path::{Component, Path};
+use std::path::{Component, Path, PathBuf};
 
 /// The file in a package's folder that describes it.
 const ABOUT: &str = "pack.json";
@@ -54,6 +54,19 @@ impl Destination {
         NewFolder::begin(ctx, place, root, KIND, overwrite).map(Self)
     }
 
+    /// Begins the package of scenes that will be the folder `place`.
+    ///
+    /// # Errors
+    /// The errors of [`NewFolder::begin_anywhere`].
+    pub(crate) fn begin_of_scenes(ctx: &Context, place: &Path, overwrite: bool) -> Result<Self> {
+        NewFolder::begin_anywhere(ctx, place, KIND, overwrite).map(Self)
+    }
+
+    /// The folder for work that the same call goes on with after a kill.
+    pub(crate) fn kept(&self) -> PathBuf {
+        self.0.kept()
+    }
+
     /// The folder to write to.
     pub(crate) fn path(&self) -> &Path {
         self.0.path()
@@ -64,9 +77,14 @@ impl Destination {
         self.0.place()
     }
 
-    /// Moves the package to its place. An earlier package there is replaced.
-    pub(crate) fn finish(self, about: &About) -> Result<()> {
+    /// Writes the package's description.
+    pub(crate) fn describe(&self, about: &About) -> Result<()> {
         write_json(&self.path().join(ABOUT), about)?;
+        Ok(())
+    }
+
+    /// Moves the described package to its place. An earlier package there is replaced.
+    pub(crate) fn finish(self) -> Result<()> {
         self.0.finish()
     }
 }
@@ -130,7 +148,8 @@ mod tests {
         let write = |text: &str, overwrite| {
             let begun = Destination::begin(&Context::default(), &place, &root, overwrite)?;
             fs::write(begun.path().join("file"), text).unwrap();
-            begun.finish(&about())
+            begun.describe(&about())?;
+            begun.finish()
         };
         fs::create_dir(&place).unwrap();
         write("first", false).unwrap();

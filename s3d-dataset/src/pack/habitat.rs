@@ -30,7 +30,7 @@ struct Objects {
 /// Writes a folder for each area. Returns notes on how to use them.
 pub(super) fn pack(ctx: &Context, source: &Source, destination: &Destination) -> Result<Vec<String>> {
     let data = &source.data;
-    let table = source.labels()?;
+    let table = source.data.labels()?;
     let progress = ctx.progress("packing", "areas", source.areas.len() as u64);
     let mut folders = Vec::new();
     for &area in &source.areas {

@@ -14,6 +14,7 @@ mod options;
 mod parquet;
 mod pointcept;
 mod scene_graph;
+mod scenes;
 mod source;
 mod spatial_qa;
 mod usd;
@@ -23,6 +24,7 @@ use crate::context::Context;
 #[cfg(doc)]
 use crate::error::Error;
 use crate::error::Result;
+use crate::record::data_set::DataSet;
 use crate::store::new_file::NewFile;
 use crate::store::new_folder::{beside, check_apart};
 use crate::store::parent_of;
@@ -34,6 +36,7 @@ pub use options::{
 };
 use s3d_geom::PointCloud;
 use s3d_io::fs::create_dir;
+pub use scenes::{default_output, pack_scenes};
 use source::Source;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -51,45 +54,19 @@ const POINTS: u32 = 100_000;
 pub fn pack(dataset: &Path, package: &Package, options: &PackOptions, ctx: &Context) -> Result<PathBuf> {
     let started = Instant::now();
     let kind = package.kind();
-    let source = Source::open(ctx, dataset, &options.areas, package.images())?;
+    let data = DataSet::open(dataset)?;
+    let source = Source::of(ctx, data, &options.areas, package.images())?;
     let place = match &options.output {
         Some(place) => place.clone(),
         None => default_place(dataset, kind)?,
     };
 
-    let into_folder = |write: &dyn Fn(&Destination) -> Result<Vec<String>>| {
+    if matches!(kind, PackageKind::Parquet | PackageKind::Objects) {
+        pack_table(ctx, &source, dataset, &place, kind, options.overwrite)?;
+    } else {
         let destination = Destination::begin(ctx, &place, dataset, options.overwrite)?;
-        let mut notes = write(&destination)?;
-        notes.extend(source.frame_notes());
-        notes.iter().for_each(|note| ctx.info(note));
-        let about = About::new(kind.to_string(), &source.areas, source.images.len(), notes);
-        destination.finish(&about)
-    };
-
-    match package {
-        Package::Webdataset(webdataset) => {
-            into_folder(&|folder| webdataset::pack(ctx, &source, folder, webdataset))?;
-        }
-        Package::Colmap(colmap) => into_folder(&|folder| colmap::pack(ctx, &source, folder, colmap))?,
-        Package::Nerfstudio(nerfstudio) => {
-            into_folder(&|folder| nerfstudio::pack(ctx, &source, folder, nerfstudio))?;
-        }
-        Package::Coco(coco) => into_folder(&|folder| coco::pack(ctx, &source, folder, coco))?,
-        Package::Huggingface(huggingface) => {
-            into_folder(&|folder| huggingface::pack(ctx, &source, folder, huggingface))?;
-        }
-        Package::Dust3r => into_folder(&|folder| multiview::dust3r::pack(ctx, &source, folder))?,
-        Package::Wai => into_folder(&|folder| multiview::wai::pack(ctx, &source, folder))?,
-        Package::Vggt => into_folder(&|folder| multiview::vggt::pack(ctx, &source, folder))?,
-        Package::Pointcept => into_folder(&|folder| pointcept::pack(ctx, &source, folder))?,
-        Package::SceneGraph(_) => into_folder(&|folder| scene_graph::pack(ctx, &source, folder))?,
-        Package::Habitat => into_folder(&|folder| habitat::pack(ctx, &source, folder))?,
-        Package::Usd => into_folder(&|folder| usd::pack(ctx, &source, folder))?,
-        Package::SpatialQa => into_folder(&|folder| spatial_qa::pack(ctx, &source, folder))?,
-        Package::Concerto => into_folder(&|folder| concerto::pack(ctx, &source, folder))?,
-        Package::Parquet(_) | Package::Objects(_) => {
-            pack_table(ctx, &source, dataset, &place, kind, options.overwrite)?;
-        }
+        fill(ctx, &source, &destination, package)?;
+        destination.finish()?;
     }
 
     let seconds = started.elapsed().as_secs_f64();
@@ -100,6 +77,30 @@ pub fn pack(dataset: &Path, package: &Package, options: &PackOptions, ctx: &Cont
     };
     ctx.info(format_args!("{}: {what} for {kind} in {seconds:.1} s", place.display()));
     Ok(place)
+}
+
+/// Writes the files of a package that is a folder.
+fn fill(ctx: &Context, source: &Source, folder: &Destination, package: &Package) -> Result<()> {
+    let mut notes = match package {
+        Package::Webdataset(options) => webdataset::pack(ctx, source, folder, options),
+        Package::Colmap(options) => colmap::pack(ctx, source, folder, options),
+        Package::Nerfstudio(options) => nerfstudio::pack(ctx, source, folder, options),
+        Package::Coco(options) => coco::pack(ctx, source, folder, options),
+        Package::Huggingface(options) => huggingface::pack(ctx, source, folder, options),
+        Package::Dust3r => multiview::dust3r::pack(ctx, source, folder),
+        Package::Wai => multiview::wai::pack(ctx, source, folder),
+        Package::Vggt => multiview::vggt::pack(ctx, source, folder),
+        Package::Pointcept => pointcept::pack(ctx, source, folder),
+        Package::SceneGraph(_) => scene_graph::pack(ctx, source, folder),
+        Package::Habitat => habitat::pack(ctx, source, folder),
+        Package::Usd => usd::pack(ctx, source, folder),
+        Package::SpatialQa => spatial_qa::pack(ctx, source, folder),
+        Package::Concerto => concerto::pack(ctx, source, folder),
+        Package::Parquet(_) | Package::Objects(_) => unreachable!("a table is a file"),
+    }?;
+    notes.extend(source.frame_notes());
+    notes.iter().for_each(|note| ctx.info(note));
+    folder.describe(&About::new(package.kind().to_string(), &source.areas, source.images.len(), notes))
 }
 
 /// Writes a Parquet table of all images, or of their objects: a file instead of a folder.

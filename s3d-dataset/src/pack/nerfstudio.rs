@@ -168,7 +168,7 @@ impl<'a> Job<'a> {
 
     /// Writes the files of an image, and returns its frame.
     fn frame(&self, image: &DatasetImage, camera: NerfstudioCamera) -> Result<NerfstudioFrame> {
-        let pose = self.source.pose(image)?;
+        let pose = self.source.data.pose(image)?;
         let size = self.source.size(image)?;
         let rgb = self.file(image, Domain::Rgb, "images")?;
         let mut frame = match camera {

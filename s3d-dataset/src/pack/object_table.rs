@@ -34,7 +34,7 @@ pub(super) fn pack(ctx: &Context, source: &Source, place: &Path) -> Result<()> {
                     file: image.relative_path(Domain::Objects),
                     object,
                 };
-                let rows: Vec<ObjectRow> = source.objects(image)?.objects.into_iter().map(row).collect();
+                let rows: Vec<ObjectRow> = source.data.objects(image)?.objects.into_iter().map(row).collect();
                 progress.add(1);
                 Ok(rows)
             },

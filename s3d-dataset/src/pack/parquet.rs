@@ -51,13 +51,13 @@ impl<'a> Rows<'a> {
     pub(super) fn new(source: &'a Source) -> Result<Self> {
         let mut views: BTreeMap<u32, Views> = BTreeMap::new();
         for &area in &source.areas {
-            let kept = source.views(area)?.into_iter().filter_map(|v| {
+            let kept = source.data.views(area)?.into_iter().filter_map(|v| {
                 let number = v.frame_num?;
                 Some(((v.camera_uuid.clone(), number), v))
             });
             views.insert(area, kept.collect());
         }
-        Ok(Self { source, views, table: source.labels()? })
+        Ok(Self { source, views, table: source.data.labels()? })
     }
 
     /// Returns a zero for each label.
@@ -98,7 +98,7 @@ fn row(
         room_type: room_type.to_owned(),
         room_number,
         files: Domain::ALL.map(|d| image.has(d).then(|| image.relative_path(d))),
-        size: image.size(&source.data.layout)?.map(|(w, h)| [w, h]),
+        size: source.data.size_of(image)?.map(|(w, h)| [w, h]),
         photograph: source.photograph(image).map(|p| p.name.clone()),
         ..ImageRow::default()
     };
@@ -112,7 +112,7 @@ fn row(
     };
 
     if image.has(Domain::Pose) {
-        let pose = source.pose(image)?;
+        let pose = source.data.pose(image)?;
         row.fov_rad = Some(pose.field_of_view_rads);
         row.location = Some(pose.camera_location);
         row.k = Some(flat(&pose.camera_k_matrix));

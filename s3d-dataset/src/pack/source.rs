@@ -6,13 +6,9 @@ use crate::error::{InputError, Result, UsageError};
 use crate::record::data_set::DataSet;
 use s3d_geom::{PointCloud, Raster};
 use s3d_io::Error as FileError;
-use s3d_io::dataset::{
-    DatasetImage, Domain, Frame, Layout, ObjectsFile, PhotographRecord, PoseFile, ViewRecord, WorldOffsets,
-    check_images_complete, read_labels, read_objects, read_pose, read_views,
-};
+use s3d_io::dataset::{DatasetImage, Domain, Frame, PhotographRecord, WorldOffsets, check_images_complete};
 use s3d_io::fs::write_bytes;
 use s3d_io::image::{decode_gray16, decode_rgb8};
-use s3d_label::LabelTable;
 use s3d_render::MISSING_DEPTH;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -28,21 +24,19 @@ pub(crate) struct Source {
     pub(crate) depth_units_per_m: f64,
     /// The offsets that were subtracted from the coordinates of the areas' scans.
     offsets: WorldOffsets,
-    /// Whether there are labels.
-    is_labelled: bool,
     /// The records of photographs, by area and camera.
     photographs: BTreeMap<(u32, String), PhotographRecord>,
 }
 
 impl Source {
-    /// Opens the complete data set in `root`. `which` are the images to pack, `None` for none.
-    pub(crate) fn open(
+    /// Takes a data set. `which` are the images to pack, `None` for none.
+    pub(crate) fn of(
         ctx: &Context,
-        root: &Path,
+        data: DataSet,
         areas: &[u32],
         which: Option<PackedImages>,
     ) -> Result<Self> {
-        let data = DataSet::open_in(&Layout::new(root))?;
+        let root = data.layout.root();
         let mut photographs = BTreeMap::new();
         for &area in &data.manifest.area_numbers {
             let of_area = data.photographs(area)?.into_iter();
@@ -101,9 +95,7 @@ impl Source {
 
         let depth_units_per_m = manifest.conventions().depth_units.per_m();
         let offsets = manifest.request().world_offsets();
-        let is_labelled = manifest.is_labelled();
-
-        Ok(Self { data, areas, images, depth_units_per_m, offsets, is_labelled, photographs })
+        Ok(Self { data, areas, images, depth_units_per_m, offsets, photographs })
     }
 
     /// A sentence on the coordinates of each area whose scan has another frame.
@@ -144,17 +136,12 @@ impl Source {
         self.images.iter().all(|image| image.has(domain))
     }
 
-    /// The pose of an image.
-    pub(crate) fn pose(&self, image: &DatasetImage) -> Result<PoseFile> {
-        Ok(read_pose(self.data.files.checked(&image.path(&self.data.layout, Domain::Pose))?)?)
-    }
-
     /// The size of an image in pixels.
     ///
     /// # Panics
     /// If the image has no PNG file.
     pub(crate) fn size(&self, image: &DatasetImage) -> Result<(u32, u32)> {
-        let size = image.size(&self.data.layout)?;
+        let size = self.data.size_of(image)?;
         Ok(size.expect("packages that ask for a size require an image"))
     }
 
@@ -183,17 +170,6 @@ impl Source {
         Ok(decode_gray16(&self.bytes(image, Domain::Depth)?, &image.path(&self.data.layout, Domain::Depth))?)
     }
 
-    /// The objects of an image.
-    pub(crate) fn objects(&self, image: &DatasetImage) -> Result<ObjectsFile> {
-        let path = image.path(&self.data.layout, Domain::Objects);
-        Ok(read_objects(self.data.files.checked(&path)?)?)
-    }
-
-    /// The candidate views of an area.
-    pub(crate) fn views(&self, area: u32) -> Result<Vec<ViewRecord>> {
-        Ok(read_views(self.data.files.checked(&self.data.layout.views_json(area))?)?)
-    }
-
     /// Points of an area's cloud, at most `most`.
     pub(crate) fn points(&self, area: u32, most: usize) -> Result<PointCloud> {
         // Only a small part of a large cloud is read.
@@ -208,7 +184,7 @@ impl Source {
     pub(crate) fn tables(&self) -> Result<Vec<(&'static str, Vec<u8>)>> {
         let mut tables =
             vec![("conventions.json", self.data.files.read_bytes(&self.data.layout.conventions())?)];
-        if self.is_labelled {
+        if self.data.manifest.is_labelled() {
             tables
                 .push(("semantic_labels.json", self.data.files.read_bytes(&self.data.layout.labels_json())?));
         }
@@ -216,19 +192,6 @@ impl Source {
             tables.push(("taxonomy.json", self.data.files.read_bytes(&self.data.layout.taxonomy_json())?));
         }
         Ok(tables)
-    }
-
-    /// The label table, if the data set has labels.
-    pub(crate) fn labels(&self) -> Result<Option<LabelTable>> {
-        if !self.is_labelled {
-            return Ok(None);
-        }
-        let path = self.data.layout.labels_json();
-        let table = self
-            .data
-            .taxonomy
-            .table_from_names(&read_labels(self.data.files.checked(&path)?)?);
-        Ok(Some(table.map_err(|e| FileError::format(&path, e.to_string()))?))
     }
 }
 

@@ -21,7 +21,7 @@ pub(super) fn pack(ctx: &Context, source: &Source, destination: &Destination) ->
     [Domain::Pose, Domain::Rgb]
         .into_iter()
         .try_for_each(|domain| source.require(domain, "OpenUSD"))?;
-    let table = source.labels()?;
+    let table = source.data.labels()?;
     let progress = ctx.progress("packing", "areas", source.areas.len() as u64);
     for &area in &source.areas {
         ctx.check()?;

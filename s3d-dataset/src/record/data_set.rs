@@ -6,8 +6,9 @@ use crate::parallel::for_each_in_order;
 use crate::record::manifest::{Head, Manifest};
 use s3d_io::Error as FileError;
 use s3d_io::dataset::{
-    CheckedFile, DatasetImage, Domain, FileRecord, ImageName, Layout, PhotographRecord, file_list_checksum,
-    read_conventions, read_file_list, read_photographs,
+    BundledFile, CheckedFile, DatasetImage, Domain, FileRecord, ImageName, Layout, PhotographRecord,
+    file_list_checksum, read_bundle, read_conventions, read_file_list, read_photographs, read_png_size,
+    read_png_size_from,
 };
 use s3d_label::Taxonomy;
 use std::collections::BTreeMap;
@@ -103,6 +104,9 @@ pub(crate) fn check_area(folder: &Path) -> Result<()> {
 pub(crate) struct Listed {
     root: PathBuf,
     records: BTreeMap<String, FileRecord>,
+    /// The files inside bundles, which [`Listed::read_bytes`] and [`Listed::png_size`] find. None of a
+    /// complete data set are.
+    bundled: BTreeMap<String, BundledFile>,
 }
 
 impl Listed {
@@ -112,7 +116,17 @@ impl Listed {
             .into_iter()
             .map(|record| (record.path.clone(), record))
             .collect();
-        Self { root: root.to_owned(), records }
+        Self { root: root.to_owned(), records, bundled: BTreeMap::new() }
+    }
+
+    /// Opens the bundles in a folder. Their files count as files of the list.
+    pub(crate) fn open_bundles(&mut self, folder: &Path) -> Result<(), FileError> {
+        for path in self.below(folder) {
+            let files = read_bundle(self.sized(&path)?)?;
+            self.bundled
+                .extend(files.into_iter().map(|file| (file.record().path.clone(), file)));
+        }
+        Ok(())
     }
 
     /// Reads the list of a data set, and checks it against the manifest.
@@ -157,7 +171,9 @@ impl Listed {
 
     /// Returns the record of a file.
     pub(crate) fn record(&self, path: &Path) -> Result<&FileRecord, FileError> {
-        let record = self.records.get(&self.name(path));
+        let name = self.name(path);
+        let bundled = || self.bundled.get(&name).map(BundledFile::record);
+        let record = self.records.get(&name).or_else(bundled);
         record.ok_or_else(|| FileError::format(path, "files.csv does not name it"))
     }
 
@@ -176,7 +192,18 @@ impl Listed {
 
     /// Returns the content of a file if it is as it was written.
     pub(crate) fn read_bytes(&self, path: &Path) -> Result<Vec<u8>, FileError> {
-        self.record(path)?.read(&self.root)
+        match self.bundled.get(&self.name(path)) {
+            Some(file) => file.read(),
+            None => self.record(path)?.read(&self.root),
+        }
+    }
+
+    /// Returns width and height of a PNG file, which may lie in a bundle. Only its head is read.
+    pub(crate) fn png_size(&self, path: &Path) -> Result<(u32, u32), FileError> {
+        match self.bundled.get(&self.name(path)) {
+            Some(file) => read_png_size_from(file.open()?, path),
+            None => read_png_size(path),
+        }
     }
 
     /// Opens a file to be read piece by piece. The end of the file is an error if the content is not as
@@ -190,12 +217,12 @@ impl Listed {
         Ok(self.record(path)?.bytes)
     }
 
-    /// Returns the files below a folder, sorted.
+    /// Returns the files below a folder, sorted. Files in bundles come last.
     pub(crate) fn below(&self, folder: &Path) -> Vec<PathBuf> {
         let prefix = self.name(folder) + "/";
-        let from = self.records.range(prefix.clone()..);
-        let inside = from.take_while(|(name, _)| name.starts_with(&prefix));
-        inside.map(|(_, record)| record.path_in(&self.root)).collect()
+        let mut inside = paths_from(&self.records, &prefix, &self.root);
+        inside.extend(paths_from(&self.bundled, &prefix, &self.root));
+        inside
     }
 
     /// Returns the images of an area, sorted by scan location and room: views by number, then the panorama.
@@ -261,4 +288,13 @@ impl Listed {
         Err(InputError::Damaged { dataset: self.root.clone(), files: faults.len(), first: first.to_string() }
             .into())
     }
+}
+
+/// Returns the paths in `root` whose names begin with `prefix`, in their order.
+fn paths_from<T>(files: &BTreeMap<String, T>, prefix: &str, root: &Path) -> Vec<PathBuf> {
+    let names = files.range(prefix.to_owned()..).map(|(name, _)| name);
+    names
+        .take_while(|name| name.starts_with(prefix))
+        .map(|name| root.join(name))
+        .collect()
 }

@@ -25,10 +25,15 @@ impl DataSet {
         let finished = Finished::read(ctx, layout)?;
 
         let assets: Vec<PathBuf> = listing::walk(&layout.assets_dir())?;
-        let begun_with = [assets, vec![layout.conventions()]].concat();
+        let views = request.numbers().into_iter().map(|area| layout.views_json(area));
+        let views: Vec<PathBuf> = views.filter(|path| path.is_file()).collect();
+        let begun_with = [assets, vec![layout.conventions()], views].concat();
         let begun_with = listing::records(ctx, layout, &begun_with)?;
         let of_units = finished.iter().flat_map(|done| done.files().iter().cloned());
-        let files = Listed::of(layout.root(), of_units.chain(begun_with));
+        let mut files = Listed::of(layout.root(), of_units.chain(begun_with));
+        for area in request.numbers() {
+            files.open_bundles(&layout.bundles_dir(area))?;
+        }
 
         manifest.areas = request
             .numbers()

@@ -82,6 +82,14 @@ impl NewFolder {
         overwrite: bool,
     ) -> Result<Self> {
         check_apart(place, root)?;
+        Self::begin_anywhere(ctx, place, kind, overwrite)
+    }
+
+    /// Begins a folder like [`NewFolder::begin`] that is made from no data set.
+    ///
+    /// # Errors
+    /// Like [`NewFolder::begin`].
+    pub fn begin_anywhere(ctx: &Context, place: &Path, kind: FolderKind, overwrite: bool) -> Result<Self> {
         let parent = parent_of(place);
         let name = Path::new(place.file_name().unwrap_or_default());
 

@@ -54,16 +54,6 @@ impl DatasetImage {
         let name = ImageName { uuid: self.uuid.clone(), room: self.room.clone(), frame: self.frame, domain };
         format!("area_{}/{}/{}/{name}", self.area, self.frame.folder(), domain.folder())
     }
-
-    /// Returns width and height in pixels, from the header of the image's first PNG file; `None` if it has
-    /// none.
-    ///
-    /// # Errors
-    /// [`Error::Io`]; [`Error::Format`] if the file is not PNG.
-    pub fn size(&self, layout: &Layout) -> Result<Option<(u32, u32)>> {
-        let first = self.domains.iter().find(|d| d.extension() == "png");
-        first.map(|d| read_png_size(&self.path(layout, *d))).transpose()
-    }
 }
 
 /// Returns the images of an area, found by the names of their files. They are sorted by scan location and
@@ -271,8 +261,15 @@ pub fn read_photographs(path: &Path) -> Result<Vec<PhotographRecord>> {
 /// # Errors
 /// [`Error::Io`]; [`Error::Format`] if the file is not PNG, or has no pixel.
 pub fn read_png_size(path: &Path) -> Result<(u32, u32)> {
+    read_png_size_from(open_file(path)?, path)
+}
+
+/// Reads width and height like [`read_png_size`]. `path` is the file's name in errors.
+///
+/// # Errors
+/// Like [`read_png_size`].
+pub fn read_png_size_from(file: impl Read, path: &Path) -> Result<(u32, u32)> {
     let mut head = Vec::with_capacity(24);
-    let file = open_file(path)?;
     file.take(24)
         .read_to_end(&mut head)
         .map_err(|e| Error::io(path, "read", e))?;

@@ -223,6 +223,12 @@ impl Layout {
         self.area_dir(area).join("3d")
     }
 
+    /// `area_1/bundles`: images until they are packed, a bundle for each scan location and photograph. No
+    /// complete data set has it.
+    pub fn bundles_dir(&self, area: u32) -> PathBuf {
+        self.area_dir(area).join("bundles")
+    }
+
     /// `area_1/data/rgb` or `area_1/pano/rgb`: the folder of a domain's images.
     pub fn image_dir(&self, area: u32, frame: Frame, domain: Domain) -> PathBuf {
         self.area_dir(area).join(frame.folder()).join(domain.folder())

@@ -14,6 +14,7 @@
 //! - [`PairColumns`]: `pairs.npz`, the images that see the same surface.
 //! - [`Split`]: folds of areas; [`write_image_list`]: lists of images.
 //! - [`FileRecord`]: `files.csv`, the sizes and checksums of all files.
+//! - [`BundleWriter`]: many files in one, until they are packed.
 //! - [`Conventions`]: `conventions.json`, the meaning of the numbers.
 //!
 //! Source: [`crate::formats`], "What is written".
@@ -28,6 +29,8 @@
 //! assert_eq!(ImageName::parse(name).unwrap().domain, Domain::Depth);
 //! ```
 
+#[cfg(feature = "dataset")]
+mod bundle;
 #[cfg(feature = "dataset")]
 mod conventions;
 pub(crate) mod domain;
@@ -58,6 +61,8 @@ mod splits;
 pub(crate) mod taxonomy;
 
 #[cfg(feature = "dataset")]
+pub use bundle::{BundleWriter, BundledFile, read_bundle};
+#[cfg(feature = "dataset")]
 pub use conventions::{
     Conventions, DepthUnits, UnknownWord, WorldOffsets, XyzType, read_conventions, read_world_offsets,
 };
@@ -71,7 +76,7 @@ pub use file_list::{
 #[cfg(feature = "dataset")]
 pub use images::{
     DatasetImage, PhotographRecord, ViewRecord, check_images_complete, dataset_images, read_photographs,
-    read_png_size, read_views,
+    read_png_size, read_png_size_from, read_views,
 };
 #[cfg(feature = "dataset")]
 pub use instances::{

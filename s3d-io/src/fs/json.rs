@@ -22,8 +22,15 @@ pub fn write_json<T: serde::Serialize + ?Sized>(path: &Path, value: &T) -> Resul
 /// # Errors
 /// [`Error::Io`]; [`Error::Format`] with the line if the file is not JSON, or does not fit `T`.
 pub fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T> {
-    let bytes = read_file(path)?;
-    serde_json::from_slice(&utf8(&bytes)).map_err(|e| Error::line(path, e.line() as u64, e.to_string()))
+    parse_json(path, &read_file(path)?)
+}
+
+/// Reads the content of the JSON file `path` as a `T`.
+///
+/// # Errors
+/// [`Error::Format`] like [`read_json`].
+pub fn parse_json<T: DeserializeOwned>(path: &Path, content: &[u8]) -> Result<T> {
+    serde_json::from_slice(&utf8(content)).map_err(|e| Error::line(path, e.line() as u64, e.to_string()))
 }
 
 #[cfg(test)]

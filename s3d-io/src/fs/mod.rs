@@ -36,10 +36,10 @@ pub(crate) mod text;
 pub use atomic::{AtomicFile, create_dir, write_bytes, write_whole};
 #[cfg(feature = "dataset")]
 pub use checksum::{BadChecksum, Checksum, ChecksumOfParts, checksum_of_file};
-#[cfg(feature = "json")]
-pub use json::read_json;
 #[cfg(all(feature = "json", feature = "write"))]
 pub use json::write_json;
+#[cfg(feature = "json")]
+pub use json::{parse_json, read_json};
 pub use names::{UniqueNames, portable_file_name};
 pub use open::{open_file, read_file};
 #[cfg(feature = "write")]

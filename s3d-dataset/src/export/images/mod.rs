@@ -1,11 +1,13 @@
 //! The images of an area. Each view is cast once, every modality is made from the same hits, and each file is
 //! written whole.
 
+mod bundle;
 pub(crate) mod objects;
 pub(crate) mod photographs;
 
 use crate::context::{Context, Progress};
 use crate::error::Result;
+use crate::export::images::bundle::UnitBundle;
 use crate::export::images::objects::InstanceFinder;
 use crate::export::images::photographs::{WrittenPhotograph, write_photograph};
 use crate::export::input::pictures::Pictures;
@@ -43,6 +45,8 @@ pub(crate) struct ImageJob<'a> {
     /// The photographs whose views are written.
     pub(crate) photographs: &'a [photographs::Shot<'a>],
     pub(crate) modalities: &'a [Domain],
+    /// Whether the files of a location or photograph go into a bundle.
+    pub(crate) is_bundled: bool,
     pub(crate) size: u32,
     pub(crate) pano_width: u32,
     /// What was subtracted from the scan's coordinates, metres; `None` if nothing was.
@@ -74,6 +78,49 @@ struct OpenLocation {
     started: Option<Instant>,
 }
 
+/// The locations with images still to write, by index.
+struct OpenLocations<'a> {
+    locations: Vec<Mutex<OpenLocation>>,
+    /// The bundle of each location; none if each file has its own place.
+    bundles: Vec<UnitBundle<'a>>,
+}
+
+impl<'a> OpenLocations<'a> {
+    fn of(job: &ImageJob<'a>, shots: &[Shot]) -> Self {
+        let mut open: Vec<OpenLocation> = job.locations.iter().map(|_| OpenLocation::default()).collect();
+        for shot in shots {
+            open[shot.location].left += 1;
+        }
+        let bundles = job.locations.iter().filter(|_| job.is_bundled);
+        Self {
+            locations: open.into_iter().map(Mutex::new).collect(),
+            bundles: bundles
+                .map(|scan| UnitBundle::new(job.layout, job.area, &scan.uuid))
+                .collect(),
+        }
+    }
+
+    /// Counts a written shot. Returns its location if that was the last of its images.
+    fn close(&self, shot: &Shot, written: WrittenShot, started: Instant) -> Result<Option<WrittenLocation>> {
+        let mut location = self.locations[shot.location]
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
+        location.add(shot.frame, written, started);
+        if location.left > 0 {
+            return Ok(None);
+        }
+
+        let OpenLocation { tally, mut files, started, .. } = std::mem::take(&mut *location);
+        drop(location);
+        files.sort();
+        if let Some(bundle) = self.bundles.get(shot.location) {
+            files = bundle.finish()?;
+        }
+        let started = started.unwrap_or_else(Instant::now);
+        Ok(Some(WrittenLocation { location: shot.location, tally, files, started }))
+    }
+}
+
 /// One image in all its modalities.
 struct Shot {
     location: usize,
@@ -100,17 +147,8 @@ pub(crate) fn write_images(
     assets: Option<AssetsWriter<'_>>,
 ) -> Result<()> {
     let shots = shots(job, candidates);
-    let mut open: Vec<OpenLocation> = job.locations.iter().map(|_| OpenLocation::default()).collect();
-    for shot in &shots {
-        open[shot.location].left += 1;
-    }
-    let open: Vec<Mutex<OpenLocation>> = open.into_iter().map(Mutex::new).collect();
-
-    for domain in job.modalities {
-        for frame in [Frame::Panorama, Frame::View(0)] {
-            create_dir(&job.layout.image_dir(job.area, frame, *domain))?;
-        }
-    }
+    let open = OpenLocations::of(job, &shots);
+    create_image_dirs(job)?;
 
     let progress = ctx.progress("rendering", "images", (shots.len() + job.photographs.len()) as u64);
     let Some(pictures) = job.pictures else {
@@ -132,11 +170,24 @@ pub(crate) fn write_images(
     write_shots(ctx, job, &[], &open, assets, &progress)
 }
 
+/// Makes the folders that the files go into.
+fn create_image_dirs(job: &ImageJob<'_>) -> Result<()> {
+    if job.is_bundled {
+        return Ok(create_dir(&job.layout.bundles_dir(job.area))?);
+    }
+    for domain in job.modalities {
+        for frame in [Frame::Panorama, Frame::View(0)] {
+            create_dir(&job.layout.image_dir(job.area, frame, *domain))?;
+        }
+    }
+    Ok(())
+}
+
 fn write_shots(
     ctx: &Context,
     job: &ImageJob<'_>,
     shots: &[Shot],
-    open: &[Mutex<OpenLocation>],
+    open: &OpenLocations<'_>,
     assets: Option<AssetsWriter<'_>>,
     progress: &Progress<'_>,
 ) -> Result<()> {
@@ -161,21 +212,13 @@ fn write_shots(
             }
             WorkItem::Shot(shot) => {
                 let started = Instant::now();
-                let written = write_shot(job, shot, memory)?;
+                let written = write_shot(job, shot, open.bundles.get(shot.location), memory)?;
                 progress.add(1);
 
-                let mut location = open[shot.location].lock().unwrap_or_else(PoisonError::into_inner);
-                location.add(shot.frame, written, started);
-                if location.left > 0 {
-                    return Ok(());
+                match open.close(shot, written, started)? {
+                    Some(location) => (job.each)(location),
+                    None => Ok(()),
                 }
-
-                // The last image of the location is written.
-                let OpenLocation { tally, mut files, started, .. } = std::mem::take(&mut *location);
-                drop(location);
-                files.sort();
-                let started = started.unwrap_or_else(Instant::now);
-                (job.each)(WrittenLocation { location: shot.location, tally, files, started })
             }
         },
     )
@@ -251,14 +294,20 @@ pub(crate) struct ImageWriter<'a> {
     pub(crate) uuid: &'a str,
     pub(crate) room: &'a str,
     pub(crate) frame: Frame,
+    /// Where the files go; `None` if each has its own place.
+    pub(crate) bundle: Option<&'a UnitBundle<'a>>,
 }
 
 impl ImageWriter<'_> {
     pub(crate) fn write(&self, domain: Domain, bytes: &[u8]) -> Result<FileRecord> {
         let layout = self.job.layout;
         let path = layout.image_path(self.job.area, self.uuid, self.room, self.frame, domain);
-        write_bytes(&path, bytes)?;
-        Ok(FileRecord::of_bytes(layout.root(), &path, bytes)?)
+        let record = FileRecord::of_bytes(layout.root(), &path, bytes)?;
+        match self.bundle {
+            Some(bundle) => bundle.append(record.clone(), bytes)?,
+            None => write_bytes(&path, bytes).map(drop)?,
+        }
+        Ok(record)
     }
 
     /// Writes the objects of an image from its hits, if they are asked for.
@@ -281,11 +330,16 @@ impl ImageWriter<'_> {
     }
 }
 
-fn write_shot(job: &ImageJob<'_>, shot: &Shot, memory: &mut Memory<'_>) -> Result<WrittenShot> {
+fn write_shot(
+    job: &ImageJob<'_>,
+    shot: &Shot,
+    bundle: Option<&UnitBundle<'_>>,
+    memory: &mut Memory<'_>,
+) -> Result<WrittenShot> {
     let Memory { caster, hits, buffers, objects } = memory;
     let scan = &job.locations[shot.location];
     let room = room_name(job.rooms[shot.location]);
-    let writer = ImageWriter { job, uuid: &scan.uuid, room: &room, frame: shot.frame };
+    let writer = ImageWriter { job, uuid: &scan.uuid, room: &room, frame: shot.frame, bundle };
     let mut written = WrittenShot::default();
     let images: Vec<Image> = job.modalities.iter().filter_map(|&domain| Image::of(domain)).collect();
 

@@ -60,7 +60,7 @@ fn require(source: &Source, kind: PackageKind) -> Result<()> {
 /// Returns the views of an area.
 pub(super) fn views_of(source: &Source, area: u32) -> Result<Vec<View<'_>>> {
     let of = |image| {
-        let pose = source.pose(image)?;
+        let pose = source.data.pose(image)?;
         let (k, camera_from_world) = (pose.camera_k_matrix, pose.camera_rt_matrix);
         Ok(View { image, size: source.size(image)?, k, camera_from_world })
     };

@@ -28,7 +28,7 @@ pub(super) fn look(ctx: &Context, source: &Source, table: &LabelTable, area: u32
         || (),
         |(), image| {
             let objects = if source.has(Domain::Objects) {
-                Some(source.objects(image)?)
+                Some(source.data.objects(image)?)
             } else {
                 None
             };
@@ -68,7 +68,7 @@ fn camera(
     image: &DatasetImage,
     objects: Option<&ObjectsFile>,
 ) -> Result<CameraNode> {
-    let pose = source.pose(image)?;
+    let pose = source.data.pose(image)?;
     let is_panorama = image.frame == Frame::Panorama;
     let kind = match () {
         () if is_panorama => "panorama",

@@ -24,7 +24,7 @@ use std::collections::BTreeMap;
 
 /// Writes `area_N.json` for each area. Returns notes on how to use them.
 pub(super) fn pack(ctx: &Context, source: &Source, destination: &Destination) -> Result<Vec<String>> {
-    let Some(table) = source.labels()? else {
+    let Some(table) = source.data.labels()? else {
         let dataset = source.data.layout.root().to_owned();
         return Err(InputError::WithoutLabels { dataset, needs: "a scene graph needs" }.into());
     };

@@ -27,7 +27,7 @@ pub(super) fn pack(ctx: &Context, source: &Source, destination: &Destination) ->
     [Domain::Rgb, Domain::Depth, Domain::Semantic, Domain::Pose]
         .into_iter()
         .try_for_each(|domain| source.require(domain, "spatial-qa"))?;
-    let Some(table) = source.labels()? else {
+    let Some(table) = source.data.labels()? else {
         let dataset = source.data.layout.root().to_owned();
         return Err(InputError::WithoutLabels { dataset, needs: "questions about rooms need" }.into());
     };

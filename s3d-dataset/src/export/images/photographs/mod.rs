@@ -5,6 +5,7 @@ pub(crate) mod agreement;
 use crate::condition::Condition;
 use crate::context::Context;
 use crate::error::Result;
+use crate::export::images::bundle::UnitBundle;
 use crate::export::images::{ImageJob, ImageWriter, Memory, count};
 use crate::export::input::photographs::{Photograph, Photographs};
 use crate::export::location::room_name;
@@ -73,7 +74,8 @@ pub(crate) fn write_photograph(
     let Photograph { name, uuid, taken, camera, .. } = photograph;
     let room = room_name(*room);
     let frame = taken.frame();
-    let writer = ImageWriter { job, uuid, room: &room, frame };
+    let bundle = job.is_bundled.then(|| UnitBundle::new(job.layout, job.area, uuid));
+    let writer = ImageWriter { job, uuid, room: &room, frame, bundle: bundle.as_ref() };
 
     let images: Vec<Image> = job.modalities.iter().filter_map(|&domain| Image::of(domain)).collect();
     let mut of_image = ImageTally { images: 1, ..ImageTally::default() };
@@ -115,6 +117,9 @@ pub(crate) fn write_photograph(
         panoramas: if is_panorama { of_image } else { none },
         views: if is_panorama { none } else { of_image },
     };
+    if let Some(bundle) = &bundle {
+        files = bundle.finish()?;
+    }
 
     let record = PhotographRecord {
         camera_uuid: uuid.clone(),
