@@ -1,10 +1,11 @@
-"""Any rays in Python: `s3d_py.Scene.cast` and Open3D's `RaycastingScene`, in turns, in one process, on one thread.
+"""Rays and nearest points in Python: `s3d_py.Scene` and Open3D's `RaycastingScene`, in turns, in one process, on one thread.
 
     python3 bench/python_cast.py DATASET [--rounds N]
 
 Needs s3d_py of a release build, and open3d. DATASET is a folder that `s3d export` or `s3d demo` made. Told is the processor
-time of a ray, the median of the rounds, and the share of rays for which both name the same face. Rays are those of a camera
-(coherent), from one place to all sides, and from anywhere to anywhere.
+time of a ray or point, the median of the rounds, and the share for which both answer the same: the face that is hit, whether
+one is, how many are, the distance to a millimetre. Rays are those of a camera (coherent), from one place to all sides, and from
+anywhere to anywhere. Distances with signs are those of a generated ball of 638,400 faces.
 """
 
 import argparse
@@ -52,16 +53,62 @@ def main():
     print(mesh)
     for name, (origins, directions) in sets.items():
         rays = o3d.core.Tensor(np.concatenate([origins, directions], 1).astype(np.float32))
-        scene.cast(origins[:10], directions[:10], threads=1)
-        ours, theirs = [], []
-        for _ in range(args.rounds):
-            taken, hits = seconds(lambda: scene.cast(origins, directions, threads=1))
-            ours.append(taken)
-            taken, found = seconds(lambda: peer.cast_rays(rays, nthreads=1))
-            theirs.append(taken)
-        same = (hits.face == found["primitive_ids"].numpy().view(np.int32)).mean()
-        a, b = (1e9 * np.median(taken) / len(directions) for taken in (ours, theirs))
-        print(f"{name:<22} s3d {a:5.0f} ns   Open3D {b:5.0f} ns   {a / b:.2f} times   same faces {same:.6f}")
+        compare(
+            f"{name}: first hits",
+            len(directions),
+            args.rounds,
+            lambda: scene.cast(origins, directions, threads=1).face,
+            lambda: peer.cast_rays(rays, nthreads=1)["primitive_ids"].numpy().view(np.int32),
+        )
+        compare(
+            f"{name}: any hit",
+            len(directions),
+            args.rounds,
+            lambda: scene.test_occlusions(origins, directions, threads=1),
+            lambda: peer.test_occlusions(rays, nthreads=1).numpy(),
+        )
+        compare(
+            f"{name}: number of hits",
+            len(directions),
+            args.rounds,
+            lambda: scene.count_intersections(origins, directions, threads=1),
+            lambda: peer.count_intersections(rays, nthreads=1).numpy(),
+        )
+
+    points = anywhere[0].astype(np.float32)
+    tensor = o3d.core.Tensor(points)
+    compare(
+        "nearest places",
+        len(points),
+        args.rounds,
+        lambda: scene.closest_points(points, threads=1).distance,
+        lambda: peer.compute_distance(tensor, nthreads=1).numpy(),
+    )
+    ball = o3d.geometry.TriangleMesh.create_sphere(1.0, 400)
+    closed = s3d.Scene(ball)
+    of_ball = o3d.t.geometry.RaycastingScene(nthreads=1)
+    of_ball.add_triangles(o3d.t.geometry.TriangleMesh.from_legacy(ball))
+    points = rng.uniform(-1.2, 1.2, (RAYS, 3)).astype(np.float32)
+    tensor = o3d.core.Tensor(points)
+    compare(
+        "signed distances",
+        len(points),
+        args.rounds,
+        lambda: closed.signed_distance(points, threads=1),
+        lambda: of_ball.compute_signed_distance(tensor, nthreads=1, nsamples=3).numpy(),
+    )
+
+
+def compare(name, count, rounds, ours, theirs):
+    """Times both in turns, and prints a line. The first calls, which build trees, are not timed."""
+    ours(), theirs()
+    taken = []
+    for _ in range(rounds):
+        (a, found), (b, expected) = seconds(ours), seconds(theirs)
+        taken.append((a, b))
+    is_same = abs(found - expected) < 1e-3 if found.dtype.kind == "f" else found == expected
+    a, b = 1e9 * np.median(taken, axis=0) / count
+    print(f"{name:<40} s3d {a:5.0f} ns   Open3D {b:5.0f} ns   {a / b:.2f} times   same {is_same.mean():.6f}")
 
 
 if __name__ == "__main__":

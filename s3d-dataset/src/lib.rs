@@ -98,7 +98,8 @@
 //! # Using a data set
 //!
 //! [`DataSet`] reads a data set for other crates: its mesh, labels, images and poses. [`pack()`] writes it
-//! for a trainer, and [`compare()`] tells what differs from an earlier one.
+//! for a trainer, which [`pack_scenes`](pack::pack_scenes) does without a data set on the disk, and
+//! [`compare()`] tells what differs from an earlier one.
 //!
 //! ```no_run
 //! use s3d_dataset::pack::{Package, PackOptions, WebdatasetOptions};

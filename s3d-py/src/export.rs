@@ -7,6 +7,7 @@ use numpy::{PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
 use s3d_dataset::export::{SceneSource, SharedScene};
 use s3d_dataset::options::Condition;
+use s3d_dataset::pack::{PackageArguments, PackageKind, pack_scenes};
 use s3d_dataset::{Error, Export, ExportOptions};
 use s3d_geom::{NO_INDEX, Pose};
 use s3d_io::camera::ScanLocation;
@@ -37,8 +38,8 @@ pub(crate) enum Scenes<'py> {
     Areas(Vec<Area<'py>>),
 }
 
-/// Makes a data set, or goes on with it. `options` is JSON. Returns a summary as JSON, or `None` if the data
-/// set was complete already.
+/// Makes a data set, or with `to` a package of that kind, or goes on with it. `options` is JSON. Returns a
+/// summary as JSON, or `None` if the data set was complete already.
 #[pyfunction]
 #[allow(clippy::too_many_arguments)]
 pub(crate) fn export(
@@ -48,6 +49,7 @@ pub(crate) fn export(
     options: &str,
     allow: Vec<String>,
     up_and_units: (Option<String>, Option<String>),
+    to: Option<&str>,
     overwrite: bool,
     threads: Option<usize>,
     sink: Py<PyAny>,
@@ -68,7 +70,15 @@ pub(crate) fn export(
     };
 
     let export = Export::new(sources).options(options).overwrite(overwrite);
-    let summary = watched(py, threads, &sink, |ctx| export.run(output, ctx))?;
+    let kinds = PackageKind::WORDS.replace('|', ", ");
+    let kind = to.map(|word| parsed("to", word, &kinds)).transpose()?;
+    let summary = watched(py, threads, &sink, |ctx| match kind {
+        Some(kind) => {
+            let package = PackageArguments::default().package(kind)?;
+            pack_scenes(&export, &package, &output, overwrite, ctx).map(Some)
+        }
+        None => export.run(output, ctx),
+    })?;
     summary.map(|summary| crate::calls::json(&summary)).transpose()
 }
 

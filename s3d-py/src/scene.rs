@@ -9,19 +9,21 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use s3d_dataset::place::PlaceOptions;
 use s3d_dataset::{check_memory, place_cameras};
-use s3d_geom::{Camera, NormalAxes, Pose, Raster};
+use s3d_geom::glam::DVec3;
+use s3d_geom::{Camera, NO_INDEX, Nearest, NearestFaces, NormalAxes, Pose, Raster};
 use s3d_io::image::{Compression, Content, encode_rgb8};
 use s3d_io::mesh::MeshFile;
 use s3d_render::{
-    Hits, MipMaps, NO_FACE, Normals, TextureFilter, cast, cast_rays, correspondences, depth_image,
-    normal_image, normal_vectors, rgb_image, sample_edges, xyz_image, xyz_image_half,
+    Hits, MipMaps, NO_FACE, Normals, TextureFilter, are_inside, are_rays_blocked, cast, cast_rays,
+    correspondences, count_hits, depth_image, normal_image, normal_vectors, rgb_image, sample_edges,
+    xyz_image, xyz_image_half,
 };
 use self_cell::self_cell;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 type Tree<'m> = s3d_render::Scene<'m>;
 type Column<'py, T> = Bound<'py, PyArray1<T>>;
-type Rows<'py> = Bound<'py, PyArray2<f64>>;
+type Rows<'py, T = f64> = Bound<'py, PyArray2<T>>;
 
 self_cell!(
     struct MeshAndTree {
@@ -31,11 +33,21 @@ self_cell!(
     }
 );
 
+self_cell!(
+    struct MeshAndNearest {
+        owner: Arc<MeshFile>,
+        #[covariant]
+        dependent: NearestFaces,
+    }
+);
+
 /// A mesh with the tree over its faces, which any number of threads share.
 #[pyclass(frozen)]
 pub(crate) struct Scene {
     cell: MeshAndTree,
     mip_maps: MipMaps,
+    /// Made when it is asked for the first time.
+    nearest: OnceLock<MeshAndNearest>,
 }
 
 /// The request for a view: modalities, smooth normals, colour samples of a pixel, and whether pixels are as
@@ -66,7 +78,8 @@ impl Scene {
         let file = Arc::clone(&mesh.get().file);
         detached(py, None, || {
             let mip_maps = MipMaps::new(&file.mesh);
-            Self { cell: MeshAndTree::new(file, |file| Tree::new(&file.mesh)), mip_maps }
+            let cell = MeshAndTree::new(file, |file| Tree::new(&file.mesh));
+            Self { cell, mip_maps, nearest: OnceLock::new() }
         })
     }
 
@@ -120,32 +133,85 @@ impl Scene {
         directions: PyReadonlyArray2<'_, f64>,
         threads: Option<usize>,
     ) -> PyResult<(Column<'py, f64>, Column<'py, i32>)> {
-        let origins = arrays::points_f64("origins", &origins)?;
-        let directions = arrays::points_f64("directions", &directions)?;
-        if origins.len() != 1 && origins.len() != directions.len() {
-            return Err(usage(format!(
-                "{} origins for {} directions: one for all, or one for each",
-                origins.len(),
-                directions.len()
-            )));
-        }
-        if origins.is_empty() {
-            return Err(usage("origins: there are none"));
-        }
-
-        let call = || {
+        let (origins, directions) = rays(&origins, &directions)?;
+        let hits: (Vec<f64>, Vec<i32>) = few_or_many(py, threads, directions.len(), || {
             let found = cast_rays(self.tree(), &origins, &directions).into_iter();
             found
                 .map(|hit| hit.map_or((f64::NAN, -1), |hit| (hit.t, hit.face as i32)))
                 .unzip()
-        };
-        // Few rays take less time than the start of a thread.
-        let hits: (Vec<f64>, Vec<i32>) = if directions.len() <= FEW_RAYS {
-            py.detach(call)
-        } else {
-            detached(py, threads, call)?
-        };
+        })?;
         Ok((PyArray1::from_vec(py, hits.0), PyArray1::from_vec(py, hits.1)))
+    }
+
+    /// Returns whether each ray hits a face before this multiple of its direction.
+    fn occluded<'py>(
+        &self,
+        py: Python<'py>,
+        origins: PyReadonlyArray2<'_, f64>,
+        directions: PyReadonlyArray2<'_, f64>,
+        before: f64,
+        threads: Option<usize>,
+    ) -> PyResult<Column<'py, bool>> {
+        let (origins, directions) = rays(&origins, &directions)?;
+        let found = few_or_many(py, threads, directions.len(), || {
+            are_rays_blocked(self.tree(), &origins, &directions, before)
+        })?;
+        Ok(PyArray1::from_vec(py, found))
+    }
+
+    /// Returns the number of faces that each ray hits.
+    fn intersections<'py>(
+        &self,
+        py: Python<'py>,
+        origins: PyReadonlyArray2<'_, f64>,
+        directions: PyReadonlyArray2<'_, f64>,
+        threads: Option<usize>,
+    ) -> PyResult<Column<'py, u32>> {
+        let (origins, directions) = rays(&origins, &directions)?;
+        let call = || count_hits(self.tree(), &origins, &directions);
+        Ok(PyArray1::from_vec(py, few_or_many(py, threads, directions.len(), call)?))
+    }
+
+    /// Returns the nearest place of the mesh to each point, its distance in metres, and its face; NaN and −1
+    /// for a point that is not finite.
+    fn closest<'py>(
+        &self,
+        py: Python<'py>,
+        points: PyReadonlyArray2<'_, f32>,
+        threads: Option<usize>,
+    ) -> PyResult<(Rows<'py, f32>, Column<'py, f32>, Column<'py, i32>)> {
+        let points = arrays::points("points", &points)?;
+        let found = few_or_many(py, threads, points.len(), || {
+            let mut found = Vec::new();
+            self.nearest().nearest_many(&points, &mut found);
+            found
+        })?;
+        let of_finite = |nearest: &Nearest, value: f32| match nearest.face {
+            NO_INDEX => f32::NAN,
+            _ => value,
+        };
+        let places: Vec<[f32; 3]> = found
+            .iter()
+            .map(|nearest| nearest.point.to_array().map(|c| of_finite(nearest, c)))
+            .collect();
+        let distances = found.iter().map(|nearest| of_finite(nearest, nearest.distance_m));
+        Ok((
+            arrays::rows(py, places)?,
+            PyArray1::from_iter(py, distances),
+            PyArray1::from_iter(py, found.iter().map(|nearest| nearest.face as i32)),
+        ))
+    }
+
+    /// Returns whether the mesh encloses each point.
+    fn contains<'py>(
+        &self,
+        py: Python<'py>,
+        points: PyReadonlyArray2<'_, f64>,
+        threads: Option<usize>,
+    ) -> PyResult<Column<'py, bool>> {
+        let points = arrays::points_f64("points", &points)?;
+        let found = few_or_many(py, threads, points.len(), || are_inside(self.tree(), &points))?;
+        Ok(PyArray1::from_vec(py, found))
     }
 
     /// Returns places that two cameras see, each K, pose and size: x and y in both images, the places, and
@@ -194,8 +260,43 @@ impl Scene {
 
 const MODALITIES: [&str; 5] = ["rgb", "depth", "normal", "xyz", "face"];
 
-/// So many rays are cast on the calling thread.
+/// So many rays or points are looked at on the calling thread.
 const FEW_RAYS: usize = 1024;
+
+/// Returns rays from their arrays: one origin, or one for each direction.
+fn rays(
+    origins: &PyReadonlyArray2<'_, f64>,
+    directions: &PyReadonlyArray2<'_, f64>,
+) -> PyResult<(Vec<DVec3>, Vec<DVec3>)> {
+    let origins = arrays::points_f64("origins", origins)?;
+    let directions = arrays::points_f64("directions", directions)?;
+    if origins.len() != 1 && origins.len() != directions.len() {
+        return Err(usage(format!(
+            "{} origins for {} directions: one for all, or one for each",
+            origins.len(),
+            directions.len()
+        )));
+    }
+    if origins.is_empty() {
+        return Err(usage("origins: there are none"));
+    }
+    Ok((origins, directions))
+}
+
+/// Calls `call` without Python's lock: for few rays or points on this thread, since they take less time than
+/// the start of another.
+fn few_or_many<T: Send>(
+    py: Python<'_>,
+    threads: Option<usize>,
+    count: usize,
+    call: impl FnOnce() -> T + Send,
+) -> PyResult<T> {
+    if count <= FEW_RAYS {
+        Ok(py.detach(call))
+    } else {
+        detached(py, threads, call)
+    }
+}
 
 /// The bytes of a pixel's hit: its face and its depth.
 const HIT_BYTES: f64 = 8.0;
@@ -212,6 +313,14 @@ fn bytes_of(modality: &str) -> f64 {
 impl Scene {
     fn tree(&self) -> &Tree<'_> {
         self.cell.borrow_dependent()
+    }
+
+    fn nearest(&self) -> &NearestFaces<'_> {
+        let file = || Arc::clone(self.cell.borrow_owner());
+        let nearest = self
+            .nearest
+            .get_or_init(|| MeshAndNearest::new(file(), |file| NearestFaces::new(&file.mesh)));
+        nearest.borrow_dependent()
     }
 
     fn draw(&self, word: &str, hits: &mut Hits, camera: &Camera, request: &Request) -> Modality {

@@ -63,6 +63,23 @@ def test_scene_files_make_what_the_command_makes(demo: Path, tmp_path: Path) -> 
     assert manifest(tmp_path / "ours")["seed"] == 1
 
 
+def test_scenes_are_packed_like_their_data_set(demo: Path, room: s3d.Mesh, tmp_path: Path) -> None:
+    scene = demo / "scan" / "scene.toml"
+    s3d.export(scene, tmp_path / "dataset", **SMALL)
+    s3d.open(tmp_path / "dataset").pack("webdataset", tmp_path / "packed")
+    summary = s3d.export(scene, tmp_path / "shards", to="webdataset", **SMALL)
+    assert summary is not None and summary["files"] == len(bytes_of(tmp_path / "shards"))
+    assert bytes_of(tmp_path / "shards") == bytes_of(tmp_path / "packed")
+    # A mesh in memory likewise.
+    place = s3d.look_at((2, 1.5, 1.2), (3, 1.5, 1.2))
+    assert s3d.export(room, tmp_path / "of_memory", locations=[place], to="huggingface", **SMALL) is not None
+    assert (tmp_path / "of_memory" / "croissant.json").exists()
+    for kind, message in [("zip", "to=.zip.: must be one of webdataset"), ("coco", "to=.*coco.*made from a data set")]:
+        with pytest.raises(s3d.UsageError, match=message):
+            s3d.export(scene, tmp_path / "none", to=kind, **SMALL)
+    assert not (tmp_path / "none").exists()
+
+
 def test_a_labelled_mesh_in_memory_makes_a_data_set(room: s3d.Mesh, tmp_path: Path) -> None:
     names = [f"{name}_office_1" for name in NAMES]
     of_face = np.arange(14) // 2

@@ -116,10 +116,96 @@ def test_rays_hit_what_images_show(scene: s3d.Scene) -> None:
     two = scene.cast([[2, 1.5, 1.2], [2, 1.5, 99]], [[0, 0, -2], [0, 0, 1]], threads=1)
     assert two.t[0] == 0.6 and two.face[0] in (0, 1)
     assert np.isnan(two.t[1]) and two.face[1] == -1 and np.isnan(two.xyz[1]).all()
-    with pytest.raises(s3d.UsageError, match="2 origins for 3 directions"):
+    with pytest.raises(s3d.UsageError, match=r"origins of shape \(2,\) for directions of \(3,\)"):
         scene.cast(np.zeros((2, 3)), np.ones((3, 3)))
-    with pytest.raises(s3d.UsageError, match="directions: an array n × 3"):
+    with pytest.raises(s3d.UsageError, match=r"directions: an array \(…, 3\), not of shape \(1, 2\)"):
         scene.cast([0, 0, 0], [[1, 2]])
+
+
+def test_rays_come_in_any_shape_and_know_their_faces(scene: s3d.Scene) -> None:
+    random = np.random.default_rng(3)
+    ways = random.normal(size=(5, 40, 3))
+    rays = scene.cast((2, 1.5, 1.2), ways)
+    assert rays.t.shape == rays.face.shape == (5, 40) and rays.xyz.shape == (5, 40, 3)
+    flat = scene.cast(np.concatenate([np.tile([2, 1.5, 1.2], (200, 1)), ways.reshape(-1, 3)], -1))
+    assert np.array_equal(flat.t, rays.t.reshape(-1), equal_nan=True)
+
+    seen = rays.face >= 0
+    assert seen.any()
+    corners = scene.mesh.vertices[scene.mesh.faces[rays.face]]
+    weights = rays.barycentrics
+    assert (weights[seen] >= -1e-6).all() and weights[seen].sum(-1) == pytest.approx(1)
+    assert (weights[..., None] * corners).sum(-2)[seen] == pytest.approx(rays.xyz[seen], abs=1e-6)
+    assert ((rays.normal * ways).sum(-1)[seen] < 0).all()
+    assert np.linalg.norm(rays.normal[seen], axis=-1) == pytest.approx(1)
+
+    # A ray that hits nothing, and a mesh without texture coordinates.
+    nothing = s3d.Scene(open_box()).cast((0, 0, 0), [-1, 0, 0])
+    assert all(np.isnan(of).all() for of in (nothing.barycentrics, nothing.normal, nothing.uv, nothing.xyz))
+    square = [[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0]]
+    image = np.zeros((2, 2, 3), np.uint8)
+    textured = s3d.Mesh(
+        square, [[0, 1, 2], [0, 2, 3]], uv=[[0, 0], [1, 0], [1, 1], [0, 1]], texture=image
+    )
+    down = s3d.Scene(textured).cast([[0.5, 1.5, 1], [1.5, 0.2, 1]], [[0, 0, -1]] * 2)
+    assert down.uv == pytest.approx(np.array([[0.25, 0.75], [0.75, 0.1]]))
+    with pytest.raises(s3d.UsageError, match=r"rays without directions: an array \(…, 6\), not of shape \(1, 3\)"):
+        scene.cast([[0, 0, 0]])
+    with pytest.raises(s3d.UsageError, match="points: could not convert"):
+        scene.closest_points("nowhere")
+    with pytest.raises(s3d.UsageError, match="one for all, or one for each"):
+        scene.cast(np.zeros((4, 3)), np.ones((2, 2, 3)))
+
+
+def test_occlusions_and_counts_agree_with_first_hits(scene: s3d.Scene) -> None:
+    ways = np.random.default_rng(4).normal(size=(3000, 3))
+    eye = (2, 1.5, 1.2)
+    rays = scene.cast(eye, ways)
+    assert np.array_equal(scene.test_occlusions(eye, ways), rays.face >= 0)
+    assert np.array_equal(scene.test_occlusions(eye, ways, before=0.9), rays.t < 0.9)
+    assert np.array_equal(scene.count_intersections(eye, ways) > 0, rays.face >= 0)
+    # What is hit is not hidden, and what is behind it is.
+    seen = rays.face >= 0
+    to = rays.xyz[seen] - eye
+    assert not scene.test_occlusions(eye, to, before=1 - 1e-6).any()
+    assert scene.test_occlusions(eye, 1.001 * to, before=1 - 1e-6).all()
+
+
+def test_distances_have_signs_where_the_mesh_is_watertight(room: s3d.Mesh) -> None:
+    corners = np.array(list(itertools.product([0, 2], [0, 3], [0, 1])), np.float32)
+    faces = [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1]]
+    faces += [[2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]]
+    box = s3d.Mesh(corners, faces)
+    assert box.is_watertight and not s3d.Mesh(corners, faces[1:]).is_watertight
+    scene = s3d.Scene(box)
+
+    points = np.random.default_rng(5).uniform(-1, 4, (30, 20, 3))
+    low, high = np.maximum(-points, 0), np.maximum(points - [2, 3, 1], 0)
+    outside = np.linalg.norm(low + high, axis=-1)
+    inside = np.minimum(points, [2, 3, 1] - points).min(-1)
+    expected = np.where(inside > 0, -inside, outside)
+    assert scene.signed_distance(points) == pytest.approx(expected, abs=1e-5)
+    assert np.array_equal(scene.contains(points), inside > 0)
+    closest = scene.closest_points(points)
+    assert closest.distance == pytest.approx(abs(expected), abs=1e-5)
+    assert np.linalg.norm(closest.xyz - points, axis=-1) == pytest.approx(abs(expected), abs=1e-5)
+    assert (closest.barycentrics >= -1e-5).all()
+    nowhere = scene.closest_points([np.nan, 0, 0])
+    assert nowhere.face[0] == -1 and np.isnan(nowhere.distance[0]) and np.isnan(nowhere.xyz).all()
+    with pytest.raises(s3d.InputError, match="not watertight: its surface ends at"):
+        s3d.Scene(open_box()).signed_distance(points)
+
+
+def test_distances_are_those_of_trimesh() -> None:
+    trimesh = pytest.importorskip("trimesh")
+    pytest.importorskip("scipy")
+    pytest.importorskip("rtree")
+    ball = trimesh.creation.icosphere(subdivisions=2)
+    points = np.random.default_rng(6).uniform(-1.5, 1.5, (200, 3))
+    # trimesh counts distances inside as positive.
+    theirs = -trimesh.proximity.signed_distance(ball, points)
+    ours = s3d.Scene(ball).signed_distance(points)
+    assert ours == pytest.approx(theirs, abs=1e-5)
 
 
 def test_many_views_are_those_of_single_calls_in_order(scene: s3d.Scene) -> None:

@@ -142,7 +142,8 @@ pub use picture::undistort::undistort;
 pub use pixel_box::PixelBox;
 pub use raster::visibility::{Caster, cast, cast_ray_by_ray, cast_strided};
 pub use ray::caster::{Hit, Sight, cast_ray, cast_ray_brute_force};
-pub use ray::wide::cast_rays;
+pub use ray::inside::are_inside;
+pub use ray::wide::{are_rays_blocked, cast_rays, count_hits};
 pub use s3d_simd::SimdLevel;
 pub use scene::Scene;
 pub use shade::channels::{

@@ -1,5 +1,6 @@
 //! Textured triangle meshes, checked once, by their constructor.
 
+mod closed;
 mod edit;
 mod merge;
 mod repeated;

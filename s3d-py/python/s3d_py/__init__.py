@@ -60,6 +60,7 @@ from ._points import (
 )
 from ._poses import CameraPose, read_poses, save_poses
 from ._progress import Progress, Task
+from ._rays import ClosestPoints, Rays
 from ._rendered import Augment, Camera, FreeSpace, Nearby, Paper, RenderedStream, RenderedViews, Sampler
 from ._results import (
     Comparison,
@@ -72,7 +73,7 @@ from ._results import (
     info,
     verify,
 )
-from ._scene import Images, Rays, Scene
+from ._scene import Images, Scene
 from ._segments import Segments, segments
 from ._views import Image, Panorama, Picture, TorchDataset, View, Views
 from ._walk import walk
@@ -85,6 +86,7 @@ __all__ = [
     "CameraPose",
     "CancelledError",
     "Candidate",
+    "ClosestPoints",
     "Comparison",
     "Correspondences",
     "DataSet",

@@ -121,6 +121,7 @@ def export(
     labels: Labels | None = None,
     up: str | None = None,
     units: str | None = None,
+    to: str | None = None,
     allow: Sequence[str] = (),
     overwrite: bool = False,
     threads: int | None = None,
@@ -134,6 +135,8 @@ def export(
       several files of meshes make one area.
     - `locations`, `labels`: for a single mesh in memory, as in `Area`.
     - `up`, `units`: of the files of meshes, as in `read_mesh`.
+    - `to`: write a package of this kind instead of a data set, without a file for each image on the way:
+      `"webdataset"`, `"huggingface"`, `"dust3r"`, `"wai"` or `"vggt"`. `DataSet.pack` makes the same.
     - `allow`: conditions of usefulness that need not be met. An error that stops an export names its
       condition.
     - `overwrite`: replace an earlier data set, or the unfinished one of another call. Other files stay.
@@ -170,7 +173,7 @@ def export(
             )
         given = [_Area(area) for area in areas]
     summary = _native.export(
-        given, fspath(output), json.dumps(options), list(allow), (up, units), overwrite, threads, sink(progress)
+        given, fspath(output), json.dumps(options), list(allow), (up, units), to, overwrite, threads, sink(progress)
     )
     return None if summary is None else json.loads(summary)
 

@@ -183,6 +183,13 @@ class Mesh:
         return self._native.area
 
     @property
+    def is_watertight(self) -> bool:
+        """Whether the surface ends nowhere, so that it encloses a volume: at each edge an even number of faces
+        meets. Computed at every access.
+        """
+        return self._native.open_edges() == 0
+
+    @property
     def bounds(self) -> npt.NDArray[np.float32]:
         """(2, 3): the smallest and the largest coordinates, metres."""
         return np.array(self._native.bounds, np.float32)

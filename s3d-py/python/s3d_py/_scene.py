@@ -6,7 +6,6 @@ import os
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -15,9 +14,10 @@ import numpy.typing as npt
 from . import _native
 from ._camera import Location, Matrix, PoseLike, matrix, pose_of
 from ._checks import number
-from ._errors import UsageError
+from ._errors import InputError, UsageError
 from ._mesh import Mesh, MeshLike, as_mesh
 from ._progress import Progress, sink
+from ._rays import ClosestPoints, Rays, as_points, as_rays
 
 MODALITIES = ("rgb", "depth", "normal", "xyz", "face")
 """The modalities of a view; `Images` describes each."""
@@ -115,31 +115,6 @@ def picture(name: str, array: npt.NDArray[Any]) -> npt.NDArray[np.uint8]:
     )
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Rays:
-    """The first hits of N rays."""
-
-    t: npt.NDArray[np.float64]
-    """(N,), the position along the ray as a multiple of the direction; metres if the direction has length 1.
-    NaN without a hit.
-    """
-    face: npt.NDArray[np.int32]
-    """(N,), index of the mesh's face. −1 without a hit."""
-    origins: npt.NDArray[np.float64]
-    directions: npt.NDArray[np.float64]
-
-    @property
-    def xyz(self) -> npt.NDArray[np.float64]:
-        """(N, 3), world metres. NaN without a hit."""
-        return self.origins + self.t[:, None] * self.directions
-
-    def __len__(self) -> int:
-        return len(self.t)
-
-    def __repr__(self) -> str:
-        return f"Rays({len(self):,}, of which {int((self.face >= 0).sum()):,} hit)"
-
-
 class Scene:
     """A mesh with a tree over its faces, built once and shared by any number of threads. The mesh is not
     copied.
@@ -153,6 +128,7 @@ class Scene:
         """`mesh` is anything that `as_mesh` takes."""
         self.mesh: Mesh = as_mesh(mesh)
         self._native = _native.Scene(self.mesh._native)
+        self._open_edges: int | None = None
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Scene, (self.mesh,)
@@ -262,19 +238,85 @@ class Scene:
             intrinsics, pose_of(T_world_cam), size, modalities, rgb_samples, smooth_normals, True
         )
 
-    def cast(self, origins: npt.ArrayLike, directions: npt.ArrayLike, *, threads: int | None = None) -> Rays:
+    def cast(
+        self, origins: npt.ArrayLike, directions: npt.ArrayLike | None = None, *, threads: int | None = None
+    ) -> Rays:
         """Returns the first hits of rays, from either side of the faces; exact, as in images.
 
-        - `origins`: (N, 3), or (3,) for all rays, world metres.
-        - `directions`: (N, 3), of any length, world metres.
+        - `origins`: (…, 3), or (3,) for all rays, world metres. Or (…, 6), origins and directions, without
+          `directions`.
+        - `directions`: (…, 3), of any length, world metres.
 
         Only hits at t > 0 count. Rays with an infinite or zero direction hit nothing. Uses `threads` threads,
         one a core if None.
         """
-        ways = np.ascontiguousarray(np.atleast_2d(np.asarray(directions, np.float64)))
-        starts = np.ascontiguousarray(np.atleast_2d(np.asarray(origins, np.float64)))
+        shape, starts, ways = as_rays(origins, directions)
         t, face = self._native.cast(starts, ways, threads)
-        return Rays(t, face, starts, ways)
+        whole = (*shape, 3)
+        starts = np.broadcast_to(starts, ways.shape)
+        return Rays(
+            t.reshape(shape), face.reshape(shape), starts.reshape(whole), ways.reshape(whole), self.mesh
+        )
+
+    def test_occlusions(
+        self,
+        origins: npt.ArrayLike,
+        directions: npt.ArrayLike | None = None,
+        *,
+        before: float = np.inf,
+        threads: int | None = None,
+    ) -> npt.NDArray[np.bool_]:
+        """Returns whether rays hit a face at t < `before`, (…), in less time than `cast`. Rays are given like
+        those of `cast`. `test_occlusions(a, b - a, before=1 - 1e-6)` tells what is hidden from a at b.
+        """
+        shape, starts, ways = as_rays(origins, directions)
+        return self._native.occluded(starts, ways, float(before), threads).reshape(shape)
+
+    def count_intersections(
+        self, origins: npt.ArrayLike, directions: npt.ArrayLike | None = None, *, threads: int | None = None
+    ) -> npt.NDArray[np.uint32]:
+        """Returns the number of faces that rays hit, (…). Rays are given like those of `cast`. A ray through an
+        edge hits all faces there.
+        """
+        shape, starts, ways = as_rays(origins, directions)
+        return self._native.intersections(starts, ways, threads).reshape(shape)
+
+    def closest_points(self, points: npt.ArrayLike, *, threads: int | None = None) -> ClosestPoints:
+        """Returns the nearest places of the mesh to points (…, 3), world metres, which are taken in 32 bits.
+        Uses `threads` threads, one a core if None.
+        """
+        shape, flat = as_points(points)
+        xyz, distance, face = self._native.closest(flat.astype(np.float32), threads)
+        return ClosestPoints(xyz.reshape(*shape, 3), distance.reshape(shape), face.reshape(shape), self.mesh)
+
+    def contains(self, points: npt.ArrayLike, *, threads: int | None = None) -> npt.NDArray[np.bool_]:
+        """Returns whether the mesh encloses points (…, 3), world metres: whether rays from them meet an odd
+        number of faces. Faces may be turned either way.
+
+        Raises `InputError` if the mesh is not watertight.
+        """
+        self._require_watertight()
+        shape, flat = as_points(points)
+        return self._native.contains(flat, threads).reshape(shape)
+
+    def signed_distance(self, points: npt.ArrayLike, *, threads: int | None = None) -> npt.NDArray[np.float32]:
+        """Returns the distances from points (…, 3) to the mesh, metres, negative inside; NaN for points that are
+        not finite.
+
+        Raises `InputError` if the mesh is not watertight.
+        """
+        inside = self.contains(points, threads=threads)
+        distance = self.closest_points(points, threads=threads).distance
+        return np.where(inside, -distance, distance)
+
+    def _require_watertight(self) -> None:
+        if self._open_edges is None:
+            self._open_edges = self.mesh._native.open_edges()
+        if self._open_edges:
+            raise InputError(
+                f"the mesh is not watertight: its surface ends at {self._open_edges:,} edges, so nothing is "
+                "inside; closest_points works for any mesh"
+            )
 
     def place_cameras(
         self,

@@ -80,7 +80,7 @@ def _ways(scene: Scene, places: Matrix, clear: float) -> list[list[tuple[int, fl
     across *= 0.5 * clear / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-9)
     free = np.abs(offset[:, 2]) < 0.3
     for side in (-1.0, 0.0, 1.0):
-        free &= ~(scene.cast(places[first] + side * across, offset, threads=1).t < 1.0)
+        free &= ~scene.test_occlusions(places[first] + side * across, offset, before=1.0, threads=1)
     for a, b, metres in zip(first[free].tolist(), second[free].tolist(), length[free].tolist()):
         ways[a].append((b, metres))
         ways[b].append((a, metres))

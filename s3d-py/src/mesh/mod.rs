@@ -206,6 +206,10 @@ impl Mesh {
         PyArray1::from_iter(py, (0..self.mesh().faces().len() as u32).map(|face| self.mesh().area(face)))
     }
 
+    fn open_edges(&self, py: Python<'_>) -> usize {
+        py.detach(|| self.mesh().open_edges())
+    }
+
     #[getter]
     fn source_faces<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<u32>> {
         PyArray1::from_slice(py, &self.file.source_faces)

@@ -53,7 +53,7 @@ pub fn cast_ray_brute_force(mesh: &TriMesh, origin: DVec3, direction: DVec3) -> 
     nearest.hit()
 }
 
-fn is_ray(origin: DVec3, direction: DVec3) -> bool {
+pub(super) fn is_ray(origin: DVec3, direction: DVec3) -> bool {
     origin.is_finite() && direction.is_finite() && direction != DVec3::ZERO
 }
 

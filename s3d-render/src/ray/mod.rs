@@ -2,4 +2,5 @@
 
 pub(crate) mod caster;
 pub(crate) mod cone;
+pub(crate) mod inside;
 pub(crate) mod wide;

@@ -4,7 +4,8 @@
 //! and four faces at a time. What may be hit goes through the exact test of a single ray, so the hits are
 //! those of [`cast_ray`], to the bit.
 
-use super::caster::{Hit, Nearest, cast_ray};
+use super::caster::{Hit, Nearest, cast_ray, is_ray};
+use super::cone::Cone;
 use crate::scene::Scene;
 use crate::scene::wide::{BLOCK, Block, IS_BLOCK, NONE, WIDE, WideNode, WideTree};
 use glam::DVec3;
@@ -37,6 +38,35 @@ const CHUNK: usize = 1024;
 /// # Panics
 /// If there is neither one origin nor one for each direction.
 pub fn cast_rays(scene: &Scene<'_>, origins: &[DVec3], directions: &[DVec3]) -> Vec<Option<Hit>> {
+    each_ray(scene, origins, directions, FirstHit)
+}
+
+/// Returns whether each ray hits a face at t < `before`, where the point that is hit is origin + t ·
+/// direction. Infinity asks for any hit. Rays are those of [`cast_rays`], and take less time here: the search
+/// ends at any face.
+///
+/// # Panics
+/// If there is neither one origin nor one for each direction.
+pub fn are_rays_blocked(
+    scene: &Scene<'_>,
+    origins: &[DVec3],
+    directions: &[DVec3],
+    before: f64,
+) -> Vec<bool> {
+    each_ray(scene, origins, directions, IsBlocked { before })
+}
+
+/// Returns how many faces each ray hits. Rays are those of [`cast_rays`]. A ray through an edge or a corner
+/// hits all faces that share it.
+///
+/// # Panics
+/// If there is neither one origin nor one for each direction.
+pub fn count_hits(scene: &Scene<'_>, origins: &[DVec3], directions: &[DVec3]) -> Vec<u32> {
+    each_ray(scene, origins, directions, HitCount)
+}
+
+/// Asks `query` for each ray.
+fn each_ray<Q: Query>(scene: &Scene<'_>, origins: &[DVec3], directions: &[DVec3], query: Q) -> Vec<Q::Found> {
     assert!(
         origins.len() == 1 || origins.len() == directions.len(),
         "{} origins for {} directions",
@@ -44,22 +74,145 @@ pub fn cast_rays(scene: &Scene<'_>, origins: &[DVec3], directions: &[DVec3]) -> 
         directions.len()
     );
     let tree = scene.wide();
-    let cast_chunk = |(chunk, hits): (usize, &mut [Option<Hit>])| {
+    let ask_chunk = |(chunk, found): (usize, &mut [Q::Found])| {
         let mut search = Search { scene, tree, nearest: Nearest::default(), stack: Vec::with_capacity(64) };
         dispatch!(level(), _simd => {
-            for (i, hit) in (chunk * CHUNK..).zip(hits) {
+            for (i, found) in (chunk * CHUNK..).zip(found) {
                 let origin = origins[if origins.len() == 1 { 0 } else { i }];
-                *hit = search.cast(origin, directions[i]);
+                *found = query.ask(&mut search, origin, directions[i]);
             }
         });
     };
-    let mut hits = vec![None; directions.len()];
-    if hits.len() <= CHUNK {
-        cast_chunk((0, &mut hits));
+    let mut found = vec![Q::Found::default(); directions.len()];
+    if found.len() <= CHUNK {
+        ask_chunk((0, &mut found));
     } else {
-        hits.par_chunks_mut(CHUNK).enumerate().for_each(cast_chunk);
+        found.par_chunks_mut(CHUNK).enumerate().for_each(ask_chunk);
     }
-    hits
+    found
+}
+
+/// What is asked for a ray.
+trait Query: Copy + Send + Sync {
+    type Found: Clone + Default + Send;
+
+    fn ask(self, search: &mut Search<'_, '_>, origin: DVec3, direction: DVec3) -> Self::Found;
+}
+
+#[derive(Clone, Copy)]
+struct FirstHit;
+
+impl Query for FirstHit {
+    type Found = Option<Hit>;
+
+    #[inline(always)]
+    fn ask(self, search: &mut Search<'_, '_>, origin: DVec3, direction: DVec3) -> Option<Hit> {
+        if !is_usual(origin, direction) {
+            return cast_ray(search.scene, origin, direction);
+        }
+        let Search { scene, tree, nearest, stack } = search;
+        nearest.clear();
+        walk(scene, tree, stack, nearest, origin, direction);
+        nearest.hit()
+    }
+}
+
+#[derive(Clone, Copy)]
+struct IsBlocked {
+    before: f64,
+}
+
+impl Query for IsBlocked {
+    type Found = bool;
+
+    #[inline(always)]
+    fn ask(self, search: &mut Search<'_, '_>, origin: DVec3, direction: DVec3) -> bool {
+        if !is_usual(origin, direction) {
+            return cast_ray(search.scene, origin, direction).is_some_and(|hit| hit.t < self.before);
+        }
+        let mut blocker = Blocker { before: self.before, is_hit: false };
+        let Search { scene, tree, stack, .. } = search;
+        walk(scene, tree, stack, &mut blocker, origin, direction);
+        blocker.is_hit
+    }
+}
+
+#[derive(Clone, Copy)]
+struct HitCount;
+
+impl Query for HitCount {
+    type Found = u32;
+
+    #[inline(always)]
+    fn ask(self, search: &mut Search<'_, '_>, origin: DVec3, direction: DVec3) -> u32 {
+        let mut counter = Counter(0);
+        let Search { scene, tree, stack, .. } = search;
+        if is_usual(origin, direction) {
+            walk(scene, tree, stack, &mut counter, origin, direction);
+        } else if is_ray(origin, direction) {
+            let mesh = scene.mesh();
+            for face in 0..mesh.faces().len() as u32 {
+                counter.meet(face, mesh.triangle(face).map(|p| p.as_dvec3()), origin, direction);
+            }
+        }
+        counter.0
+    }
+}
+
+/// What becomes of the faces that a ray may hit.
+trait Meet {
+    /// Meets a face with these corners in the world.
+    fn meet(&mut self, face: u32, corners: [DVec3; 3], origin: DVec3, direction: DVec3);
+
+    /// Returns the `t` beyond which faces are of no use.
+    fn reach(&self) -> f64;
+}
+
+impl Meet for Nearest {
+    #[inline(always)]
+    fn meet(&mut self, face: u32, corners: [DVec3; 3], origin: DVec3, direction: DVec3) {
+        self.meet_corners(face, corners, origin, direction);
+    }
+
+    #[inline(always)]
+    fn reach(&self) -> f64 {
+        Self::reach(self)
+    }
+}
+
+/// Tells whether a face is hit at t < `before`.
+struct Blocker {
+    before: f64,
+    is_hit: bool,
+}
+
+impl Meet for Blocker {
+    #[inline(always)]
+    fn meet(&mut self, _face: u32, corners: [DVec3; 3], origin: DVec3, direction: DVec3) {
+        let cone = Cone::of_corners(corners, origin).filter(|cone| cone.contains(direction));
+        self.is_hit |= cone.is_some_and(|cone| cone.distance(direction) < self.before);
+    }
+
+    #[inline(always)]
+    fn reach(&self) -> f64 {
+        if self.is_hit { f64::NEG_INFINITY } else { self.before }
+    }
+}
+
+/// Counts the faces that are hit.
+struct Counter(u32);
+
+impl Meet for Counter {
+    #[inline(always)]
+    fn meet(&mut self, _face: u32, corners: [DVec3; 3], origin: DVec3, direction: DVec3) {
+        let cone = Cone::of_corners(corners, origin);
+        self.0 += u32::from(cone.is_some_and(|cone| cone.contains(direction)));
+    }
+
+    #[inline(always)]
+    fn reach(&self) -> f64 {
+        f64::INFINITY
+    }
 }
 
 /// A ray in single precision, with margins on the safe side.
@@ -72,7 +225,7 @@ struct Bounds {
     is_back: [bool; 3],
 }
 
-/// A search for the first hits of rays, which keeps its memory between them.
+/// A search that keeps its memory between rays.
 struct Search<'s, 'm> {
     scene: &'s Scene<'m>,
     tree: &'s WideTree,
@@ -80,58 +233,67 @@ struct Search<'s, 'm> {
     stack: Vec<(f32, u32)>,
 }
 
-impl Search<'_, '_> {
-    #[inline(always)]
-    fn cast(&mut self, origin: DVec3, direction: DVec3) -> Option<Hit> {
-        // Lengths are multiples of a direction whose largest component is 1.
-        let longest = direction.abs().max_element();
-        let is_usual = origin.abs().max_element() < 1e15 && (1e-100..1e100).contains(&longest);
-        if !is_usual || !origin.is_finite() || !direction.is_finite() {
-            return cast_ray(self.scene, origin, direction);
-        }
-        let bounds = Bounds::new(origin, direction / longest, self.scene.magnitude(origin));
-        self.nearest.clear();
-        self.stack.clear();
-        self.stack.push((0.0, 0));
-        let mut reach = f32::INFINITY;
+/// Returns whether single precision has room for the numbers of a ray.
+#[inline(always)]
+fn is_usual(origin: DVec3, direction: DVec3) -> bool {
+    let longest = direction.abs().max_element();
+    let has_room = origin.abs().max_element() < 1e15 && (1e-100..1e100).contains(&longest);
+    has_room && origin.is_finite() && direction.is_finite()
+}
 
-        while let Some((enter, child)) = self.stack.pop() {
-            if enter > reach {
-                continue;
-            }
-            if child & IS_BLOCK == 0 {
-                self.open(child, &bounds, reach);
-                continue;
-            }
+/// Lets `found` meet the faces that a usual ray may hit, those of near boxes first.
+#[inline(always)]
+fn walk(
+    scene: &Scene<'_>,
+    tree: &WideTree,
+    stack: &mut Vec<(f32, u32)>,
+    found: &mut impl Meet,
+    origin: DVec3,
+    direction: DVec3,
+) {
+    // Lengths are multiples of a direction whose largest component is 1.
+    let longest = direction.abs().max_element();
+    let bounds = Bounds::new(origin, direction / longest, scene.magnitude(origin));
+    let reach_of = |found: &_| (Meet::reach(found) * longest) as f32 * (1.0 + SLACK);
+    let mut reach = reach_of(found);
+    stack.clear();
+    stack.push((0.0, 0));
 
-            let block = &self.tree.blocks[(child & !IS_BLOCK) as usize];
-            let may_hit = block.may_hit(origin, direction);
-            for (lane, face) in block.faces.into_iter().enumerate() {
-                if may_hit[lane] && face != NONE {
-                    self.nearest.meet_corners(face, block.triangle(lane), origin, direction);
-                }
-            }
-            reach = (self.nearest.reach() * longest) as f32 * (1.0 + SLACK);
+    while let Some((enter, child)) = stack.pop() {
+        if enter > reach {
+            continue;
         }
-        self.nearest.hit()
+        if child & IS_BLOCK == 0 {
+            open(tree, stack, child, &bounds, reach);
+            continue;
+        }
+
+        let block = &tree.blocks[(child & !IS_BLOCK) as usize];
+        let may_hit = block.may_hit(origin, direction);
+        for (lane, face) in block.faces.into_iter().enumerate() {
+            if may_hit[lane] && face != NONE {
+                found.meet(face, block.triangle(lane), origin, direction);
+            }
+        }
+        reach = reach_of(found);
     }
+}
 
-    /// Puts the children of a node that the ray enters before `reach` on the stack, the nearest last.
-    #[inline(always)]
-    fn open(&mut self, node: u32, bounds: &Bounds, reach: f32) {
-        let node = &self.tree.nodes[node as usize];
-        let enters = node.enters(bounds, reach);
-        let first = self.stack.len();
-        for (enter, child) in enters.into_iter().zip(node.children) {
-            if enter < f32::INFINITY {
-                self.tree.prefetch(child);
-                // The farthest comes first.
-                let mut at = self.stack.len();
-                self.stack.push((enter, child));
-                while at > first && self.stack[at - 1].0 < enter {
-                    self.stack.swap(at - 1, at);
-                    at -= 1;
-                }
+/// Puts the children of a node that the ray enters before `reach` on the stack, the nearest last.
+#[inline(always)]
+fn open(tree: &WideTree, stack: &mut Vec<(f32, u32)>, node: u32, bounds: &Bounds, reach: f32) {
+    let node = &tree.nodes[node as usize];
+    let enters = node.enters(bounds, reach);
+    let first = stack.len();
+    for (enter, child) in enters.into_iter().zip(node.children) {
+        if enter < f32::INFINITY {
+            tree.prefetch(child);
+            // The farthest comes first.
+            let mut at = stack.len();
+            stack.push((enter, child));
+            while at > first && stack[at - 1].0 < enter {
+                stack.swap(at - 1, at);
+                at -= 1;
             }
         }
     }
@@ -271,6 +433,7 @@ fn dot(a: &Lanes, b: &Lanes) -> [f64; BLOCK] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ray::caster::cast_ray_brute_force;
     use glam::Vec3;
     use s3d_geom::TriMesh;
     use s3d_synth::scenes::scan_like;
@@ -293,7 +456,45 @@ mod tests {
             let origin = origins[if origins.len() == 1 { 0 } else { i }];
             assert_eq!(*hit, cast_ray(&scene, origin, directions[i]), "{origin} {}", directions[i]);
         }
+
+        // Any hit, and hits before a face that is hit, agree with the first hits.
+        let is_hit: Vec<bool> = found.iter().map(Option::is_some).collect();
+        assert_eq!(are_rays_blocked(&scene, origins, directions, f64::INFINITY), is_hit);
+        let median = found
+            .iter()
+            .flatten()
+            .map(|hit| hit.t)
+            .nth(found.len() / 3)
+            .unwrap_or(1.0);
+        let before: Vec<bool> = found.iter().map(|hit| hit.is_some_and(|hit| hit.t < median)).collect();
+        assert_eq!(are_rays_blocked(&scene, origins, directions, median), before);
+        let counts = count_hits(&scene, origins, directions);
+        assert!(
+            counts
+                .iter()
+                .zip(&is_hit)
+                .all(|(count, is_hit)| (*count > 0) == *is_hit)
+        );
         found.iter().flatten().count()
+    }
+
+    #[test]
+    fn hits_are_counted_like_single_faces() {
+        let mesh = scan_like(2000, 9);
+        let scene = Scene::new(&mesh);
+        let directions: Vec<DVec3> = (0..300).map(vector).collect();
+        let counts = count_hits(&scene, &[DVec3::new(0.1, 0.2, 1.0)], &directions);
+        let single = |direction: &DVec3| {
+            let faces = 0..mesh.faces().len() as u32;
+            let hit = faces.filter(|face| {
+                let corners = mesh.triangle(*face).map(|p| p.as_dvec3());
+                let one = TriMesh::from_faces(corners.map(|p| p.as_vec3()).to_vec(), vec![[0, 1, 2]]);
+                cast_ray_brute_force(&one.unwrap(), DVec3::new(0.1, 0.2, 1.0), *direction).is_some()
+            });
+            hit.count() as u32
+        };
+        assert_eq!(counts, directions.iter().map(single).collect::<Vec<_>>());
+        assert!(counts.iter().any(|count| *count > 1));
     }
 
     #[test]
