@@ -16,6 +16,7 @@ mod fuse;
 mod mesh;
 mod points;
 mod poses;
+mod resample;
 mod scene;
 mod segments;
 mod work;
@@ -50,6 +51,8 @@ mod native {
     use super::points::{fill, sample, vote};
     #[pymodule_export]
     use super::poses::read_poses;
+    #[pymodule_export]
+    use super::resample::averaged;
     #[pymodule_export]
     use super::scene::{Scene, encode_png, look_at};
     #[pymodule_export]

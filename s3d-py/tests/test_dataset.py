@@ -171,6 +171,50 @@ def test_threads_and_pickles_read_the_same(ds: s3d.DataSet) -> None:
     assert set(kept) >= {"rgb", "depth", "normal", "xyz", "labels", "classes"}
 
 
+def test_an_image_in_another_size_has_the_same_camera(ds: s3d.DataSet) -> None:
+    view = ds.views()[0]
+    assert view.size == (160, 160)
+    small = view.at((40, 80))
+    assert small.size == (40, 80) and small.rgb.shape == (80, 40, 3)
+    means = view.rgb.reshape(80, 2, 40, 4, 3).mean((1, 3))
+    assert abs(small.rgb - means).max() <= 0.5 + 1e-4
+    assert np.array_equal(small.depth, view.depth[1::2, 2::4], equal_nan=True)
+    assert np.array_equal(small.labels, view.labels[1::2, 2::4]) and small.normal.shape == (80, 40, 3)
+    assert np.array_equal(small.points(), view.points()[1::2, 2::4], equal_nan=True)
+
+    # A place is at the same share of the image, and a crop begins elsewhere.
+    points = view.points()[::40, ::40].reshape(-1, 3)
+    points = points[~np.isnan(points).any(1)]
+    at, depth = view.project(points)
+    assert small.project(points)[0] == pytest.approx(at * [0.25, 0.5])
+    assert small.project(points)[1] == pytest.approx(depth)
+    part = view.at(crop=(10, 20, 60, 90))
+    assert part.size == (60, 90) and np.array_equal(part.rgb, view.rgb[20:110, 10:70])
+    assert part.project(points)[0] == pytest.approx(at - [10, 20])
+    both = view.at((30, 45), crop=(10, 20, 60, 90))
+    assert both.project(points)[0] == pytest.approx((at - [10, 20]) / 2)
+
+    # Sizes that do not divide: means add up to the same.
+    odd = view.at((37, 53))
+    assert odd.rgb.mean() == pytest.approx(view.rgb.mean(), abs=0.5) and odd.classes.shape == (53, 37)
+    assert odd != view and odd == view.at((37, 53)) and pickle.loads(pickle.dumps(odd)).size == (37, 53)
+    assert np.array_equal(view.at((160, 160)).rgb, view.rgb)
+    pano = ds.panoramas()[0]
+    assert pano.at((64, 32)).depth.shape == (32, 64)
+    image: s3d.Image
+    size: Any
+    crop: Any
+    for image, size, crop, message in [
+        (view, (0, 5), None, "size=0: must be a whole number from 1"),
+        (view, None, (150, 0, 20, 5), "within 160 × 160 pixels"),
+        (view, (4, 4, 4), None, "2 whole numbers"),
+        (small, (4, 4), None, "already"),
+        (pano, None, (0, 0, 4, 4), "panorama"),
+    ]:
+        with pytest.raises(s3d.UsageError, match=message):
+            image.at(size, crop=crop)
+
+
 def test_torch_takes_it(ds: s3d.DataSet) -> None:
     chairs = ds.views(room=ds.views()[0].room)
     samples = chairs.torch(["rgb", "depth", "classes", "K"], lambda sample: sample)
@@ -186,6 +230,7 @@ def test_torch_takes_it(ds: s3d.DataSet) -> None:
     first, view = batches[0], ds.views()[0]
     assert first["rgb"].shape == (2, 3, 160, 160) and first["classes"].dtype == torch.int64
     assert np.array_equal(first["depth"][0].numpy(), view.depth, equal_nan=True)
+    assert ds.torch(["rgb", "K"], size=(64, 48))[0]["rgb"].shape == (3, 48, 64)
 
 
 def test_what_is_damaged_is_told_with_its_file(ds: s3d.DataSet, tmp_path: Path) -> None:

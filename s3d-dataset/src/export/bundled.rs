@@ -25,8 +25,8 @@ pub(crate) struct PackageJob<'a, P> {
 }
 
 /// Makes the images of scenes in the folder of `target`, each location's in one file, and packs them. What
-/// `pack` returns is called at the end: it moves the package to its place, and returns the number of its files
-/// and their bytes.
+/// `pack` returns is called at the end: it moves the package to its place, and returns the number of its
+/// files and their bytes.
 ///
 /// `target` is a folder for this work alone: an equal call goes on there, and any other call begins anew.
 pub(crate) fn export_bundled<F: FnOnce() -> Result<(u64, u64)>>(

@@ -46,10 +46,10 @@ impl Needs {
     }
 }
 
-/// Makes a package from the scenes of `export`, with the bytes of [`Export::run`] and [`pack`](super::pack()).
-/// While it is made, the images wait in a hidden folder beside `place`, those of a scan location in one file.
-/// After a kill, the same call goes on there. Only the kinds `webdataset`, `huggingface`, `dust3r`, `wai` and
-/// `vggt` can be made like that.
+/// Makes a package from the scenes of `export`, with the bytes of [`Export::run`] and
+/// [`pack`](super::pack()). While it is made, the images wait in a hidden folder beside `place`, those of a
+/// scan location in one file. After a kill, the same call goes on there. Only the kinds `webdataset`,
+/// `huggingface`, `dust3r`, `wai` and `vggt` can be made like that.
 ///
 /// # Errors
 /// [`Error::Usage`] if it is of another kind, lacks a modality that it needs, or something is in the way; the

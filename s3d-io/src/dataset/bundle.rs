@@ -1,9 +1,9 @@
 //! Many files of a data set in one, for images that wait to be packed: file systems of clusters slow down on
 //! millions of small files.
 //!
-//! A bundle holds the contents one after another, then a JSON list of their [`FileRecord`]s in the same order,
-//! then the length of that list (8 bytes, little-endian). Only s3d reads bundles, and removes them when a
-//! package is complete.
+//! A bundle holds the contents one after another, then a JSON list of their [`FileRecord`]s in the same
+//! order, then the length of that list (8 bytes, little-endian). Only s3d reads bundles, and removes them
+//! when a package is complete.
 
 use crate::dataset::file_list::FileRecord;
 use crate::error::{Error, Result};

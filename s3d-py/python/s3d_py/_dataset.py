@@ -354,17 +354,21 @@ class DataSet(Sequence[Union[View, Panorama]]):
         return [known[index] for index in indices]
 
     def torch(
-        self, modalities: Sequence[str], transform: Callable[[dict[str, Any]], Any] | None = None
+        self,
+        modalities: Sequence[str],
+        transform: Callable[[dict[str, Any]], Any] | None = None,
+        *,
+        size: tuple[int, int] | None = None,
     ) -> TorchDataset:
         """Returns its perspective views as a map-style data set for torch. For other images, call
         `dataset.views(room=…).torch(…)` or `dataset.panoramas().torch(…)`. The first sample imports torch.
 
         A sample is a dict of tensors: each of `modalities` and "index". The modalities are words of `ARRAYS` and
         `REFINED`, as (C, H, W) or (H, W) with indices as int64 (−1 for none: `ignore_index=-1`), "points", "K" and
-        "T_world_cam". `transform` turns a sample into the value that the loader returns. The data set can be
+        "T_world_cam". With `size`, width and height, images are resampled as `View.at` does. `transform` turns a sample into the value that the loader returns. The data set can be
         pickled, so any number of workers read at the same time.
         """
-        return self.views().torch(modalities, transform)
+        return self.views().torch(modalities, transform, size=size)
 
     def show(self, image: Image, modality: str = "rgb") -> Picture:
         """Returns a modality of an image in colours, which notebooks show: see `View.picture`."""

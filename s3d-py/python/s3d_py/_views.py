@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from . import _native
 from ._camera import Matrix
-from ._checks import rows
+from ._checks import number, rows
 from ._errors import UsageError
 from ._files import replaced
 from ._packages import for_torch
@@ -56,18 +56,23 @@ class Image:
         self._dataset, self.index = dataset, index
         self.area, self.location, self.room, self._frame, self.files = dataset._images[index]
         self._loaded: dict[str, npt.NDArray[Any]] = {}
+        # The part that is shown: x, y, width and height, and the size that it is shown in; None for all, as it is.
+        self._window: Window | None = None
+        self._shown_in: tuple[int, int] | None = None
+
+    @property
+    def _key(self) -> tuple[Any, ...]:
+        return self._dataset.root, self.index, self._window, self._shown_in
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), (self._dataset, self.index)
+        return _shown, (type(self), self._dataset, self.index, self._window, self._shown_in)
 
     def __eq__(self, other: object) -> bool:
         """Whether both are the same image of a data set in the same folder."""
-        if not isinstance(other, Image):
-            return NotImplemented
-        return self.index == other.index and self._dataset.root == other._dataset.root
+        return self._key == other._key if isinstance(other, Image) else NotImplemented
 
     def __hash__(self) -> int:
-        return hash((self._dataset.root, self.index))
+        return hash(self._key)
 
     index: int
     """The index in the data set: `dataset[view.index]` is the same image."""
@@ -103,12 +108,33 @@ class Image:
     @cached_property
     def size(self) -> tuple[int, int]:
         """Width and height, pixels."""
-        return self._dataset._native.size(self.index)
+        return self._shown_in or self._dataset._native.size(self.index)
 
     @cached_property
     def _camera(self) -> tuple[Matrix, Matrix]:
-        K, T = self._dataset._native.camera(self.index)
-        return np.array(K), np.array(T)
+        K, T = (np.array(matrix) for matrix in self._dataset._native.camera(self.index))
+        if self._window is not None:
+            x, y, width, height = self._window
+            K[:2, 2] -= [x, y]
+            K[:2] *= np.divide(self.size, [width, height])[:, None]
+        return K, T
+
+    def at(self: AnImage, size: tuple[int, int] | None = None, *, crop: Window | None = None) -> AnImage:
+        """Returns the image in another size, width and height in pixels, and of a view only the part `crop`: x, y,
+        width and height. Its arrays, `K` and `project` are those of the new pixels. Colours are means of the area
+        that a pixel covers, and all else is that of the old pixel at its centre. `files`, `pose`, `objects` and
+        `shares` are those of the whole image, and so are calls of the data set that take an image.
+        """
+        whole = self._dataset._native.size(self.index)
+        if self._window is not None:
+            raise UsageError("at: the image is in another size already; take the one of the data set")
+        if crop is not None and self.is_panorama:
+            raise UsageError("crop: of views; a part of a panorama is none")
+        x, y, width, height = window = (0, 0, *whole) if crop is None else _whole_numbers("crop", crop, 4, 0)
+        if not (0 < width <= whole[0] - x and 0 < height <= whole[1] - y):
+            raise UsageError(f"crop={window}: x, y, width and height within {whole[0]} × {whole[1]} pixels")
+        shown_in = (width, height) if size is None else _whole_numbers("size", size, 2, 1)
+        return _shown(type(self), self._dataset, self.index, window, shown_in)
 
     @property
     def T_world_cam(self) -> Matrix:
@@ -207,7 +233,7 @@ class Image:
 
     def points(self) -> npt.NDArray[np.float32]:
         """Returns world metres, (H, W, 3), from depth and pose. NaN where depth is missing."""
-        return self._dataset._native.points(self.index)
+        return self._taken(self._dataset._native.points(self.index))
 
     @cached_property
     def shares(self) -> dict[str, float]:
@@ -233,6 +259,10 @@ class Image:
         found = self._loaded.get(modality)
         if found is not None:
             return found
+        if self._window is not None:
+            shown = self._shown(modality)
+            shown.flags.writeable = False
+            return shown
         index, last = self._dataset._last
         if index != self.index:
             last = {}
@@ -255,6 +285,22 @@ class Image:
         if modality in ("labels", "instances", "refined_labels"):
             return Picture(picture("face", np.where(array > 0, array, -1)))
         return Picture(np.ascontiguousarray(array if modality == "pretty" else picture(modality, array)))
+
+    def _shown(self, modality: str) -> npt.NDArray[Any]:
+        """Reads an array of the whole image, and returns it in the size that is asked for."""
+        array = image_at(self._dataset, self.index)[modality]
+        if modality == "rgb" and self._window is not None:
+            return _native.averaged(array, self._window, self.size)
+        return self._taken(array)
+
+    def _taken(self, array: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        """Returns the old pixels at the centres of the new ones."""
+        if self._window is None:
+            return array
+        x, y, width, height = self._window
+        columns = x + (np.arange(self.size[0]) * 2 + 1) * width // (2 * self.size[0])
+        rows = y + (np.arange(self.size[1]) * 2 + 1) * height // (2 * self.size[1])
+        return array[rows[:, None], columns]
 
     def _read(self, modality: str) -> npt.NDArray[Any]:
         file, native = _FILE_OF.get(modality, modality), self._dataset._native
@@ -330,6 +376,24 @@ class Panorama(Image):
 
 
 AnImage = TypeVar("AnImage", bound=Image)
+Window = tuple[int, int, int, int]
+
+
+def _shown(
+    kind: type[AnImage], dataset: DataSet, index: int, window: Window | None, size: tuple[int, int] | None
+) -> AnImage:
+    """Returns an image of which a part is shown in a size."""
+    image = kind(dataset, index)
+    image._window, image._shown_in = window, size
+    return image
+
+
+def _whole_numbers(what: str, values: Sequence[int], count: int, least: int) -> Any:
+    if len(values) != count:
+        raise UsageError(f"{what}={tuple(values)}: {count} whole numbers")
+    return tuple(number(what, value, least, 1 << 20) for value in values)
+
+
 Some = TypeVar("Some", bound=Image, covariant=True)
 
 
@@ -378,10 +442,14 @@ class Views(Sequence[Some], Generic[Some]):
         return (self[place] for place in range(len(self)))
 
     def torch(
-        self, modalities: Sequence[str], transform: Callable[[dict[str, Any]], Any] | None = None
+        self,
+        modalities: Sequence[str],
+        transform: Callable[[dict[str, Any]], Any] | None = None,
+        *,
+        size: tuple[int, int] | None = None,
     ) -> TorchDataset:
         """Returns these images as a data set for torch: see `DataSet.torch`."""
-        return TorchDataset._of(self, modalities, transform)
+        return TorchDataset._of(self, modalities, transform, size)
 
     def __repr__(self) -> str:
         panoramas = sum(self.dataset._images[index][3] is None for index in self.indices)
@@ -394,30 +462,37 @@ class TorchDataset:
     """
 
     def __init__(
-        self, views: Views[Image], modalities: Sequence[str], transform: Callable[[dict[str, Any]], Any] | None
+        self,
+        views: Views[Image],
+        modalities: Sequence[str],
+        transform: Callable[[dict[str, Any]], Any] | None,
+        size: tuple[int, int] | None = None,
     ) -> None:
         others = [word for word in modalities if word not in (*ARRAYS, *REFINED, "K", "T_world_cam", "points")]
         if others or not modalities:
             raise UsageError(
                 f"modalities={list(modalities)}: some of {', '.join(ARRAYS + REFINED)}, points, K, T_world_cam"
             )
-        self.views, self.modalities, self.transform = views, tuple(modalities), transform
+        self.views, self.modalities, self.transform, self.size = views, tuple(modalities), transform, size
 
     @staticmethod
     def _of(
-        views: Views[Image], modalities: Sequence[str], transform: Callable[[dict[str, Any]], Any] | None
+        views: Views[Image],
+        modalities: Sequence[str],
+        transform: Callable[[dict[str, Any]], Any] | None,
+        size: tuple[int, int] | None,
     ) -> TorchDataset:
-        return for_torch(TorchDataset, "Dataset")(views, modalities, transform)
+        return for_torch(TorchDataset, "Dataset")(views, modalities, transform, size)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return TorchDataset._of, (self.views, self.modalities, self.transform)
+        return TorchDataset._of, (self.views, self.modalities, self.transform, self.size)
 
     def __len__(self) -> int:
         return len(self.views)
 
     def __getitem__(self, index: int) -> Any:
         torch: Any = importlib.import_module("torch")
-        view = self.views[index]
+        view = self.views[index] if self.size is None else self.views[index].at(self.size)
         sample: dict[str, Any] = {"index": view.index}
         for word in self.modalities:
             if word in ("K", "T_world_cam"):
