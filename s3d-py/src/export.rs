@@ -75,7 +75,7 @@ pub(crate) fn export(
     let summary = watched(py, threads, &sink, |ctx| match kind {
         Some(kind) => {
             let package = PackageArguments::default().package(kind)?;
-            pack_scenes(&export, &package, &output, overwrite, ctx).map(Some)
+            pack_scenes(&export, &package, &output, ctx).map(Some)
         }
         None => export.run(output, ctx),
     })?;

@@ -7,13 +7,13 @@ use pyo3::prelude::*;
 use s3d_geom::Raster;
 
 /// What an output pixel takes of a row or column: the first input pixel, and the weights from there on.
-struct Box {
+struct Share {
     first: usize,
     weights: Vec<f32>,
 }
 
-/// Cuts `length` pixels from `start` on into `count` boxes of equal width.
-fn boxes(start: u32, length: u32, count: u32) -> Vec<Box> {
+/// Shares `length` pixels from `start` on out among `count` output pixels.
+fn shares(start: u32, length: u32, count: u32) -> Vec<Share> {
     let width = f64::from(length) / f64::from(count);
     let of = |i: u32| {
         let (begin, end) = (f64::from(i) * width, f64::from(i + 1) * width);
@@ -24,7 +24,7 @@ fn boxes(start: u32, length: u32, count: u32) -> Vec<Box> {
             let pixel = f64::from(pixel);
             ((end.min(pixel + 1.0) - begin.max(pixel)).max(0.0) / width) as f32
         };
-        Box { first: (start + pixels.start) as usize, weights: pixels.map(covered).collect() }
+        Share { first: (start + pixels.start) as usize, weights: pixels.map(covered).collect() }
     };
     (0..count).map(of).collect()
 }
@@ -47,7 +47,7 @@ pub(crate) fn averaged<'py>(
     let pixels = image.as_slice().map_err(|e| usage(e.to_string()))?;
 
     let averaged = py.detach(|| {
-        let (columns, rows) = (boxes(x, wide, size[0]), boxes(y, high, size[1]));
+        let (columns, rows) = (shares(x, wide, size[0]), shares(y, high, size[1]));
         let mut averaged = Vec::with_capacity(size[0] as usize * size[1] as usize);
         let mut sums = vec![[0.0f32; 3]; size[0] as usize];
         for row in &rows {

@@ -58,7 +58,7 @@ pub(crate) fn run(args: ExportArgs) -> Outcome<()> {
     on_threads(args.threads, |context| {
         if let Some(kind) = args.to {
             let package = PackageArguments::default().package(kind)?;
-            return pack_scenes(&export, &package, &output, args.overwrite, context).map(drop);
+            return pack_scenes(&export, &package, &output, context).map(drop);
         }
         export.run(&output, context)?;
         if args.pairs {

@@ -12,10 +12,9 @@ use s3d_render::Scene;
 use std::path::{Path, PathBuf};
 
 /// The form in which an export writes its images, and whether it writes the rest.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Form {
     /// A data set: a file for each image, with meshes and points.
-    #[default]
     DataSet,
     /// What a package is made from: a bundle for each scan location and photograph. Meshes and points only if
     /// the package needs them.

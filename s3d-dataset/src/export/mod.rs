@@ -103,6 +103,11 @@ impl Export {
         Run::new(ctx, &self.target(output.into())).look().map(drop)
     }
 
+    /// Returns whether what an earlier call made is replaced.
+    pub(crate) fn overwrites(&self) -> bool {
+        self.overwrite
+    }
+
     /// Returns the export of only the modalities that `is_used` tells of.
     pub(crate) fn keeping(&self, is_used: impl Fn(Domain) -> bool) -> Self {
         let mut kept = self.clone();

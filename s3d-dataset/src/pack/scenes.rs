@@ -48,19 +48,14 @@ impl Needs {
 
 /// Makes a package from the scenes of `export`, with the bytes of [`Export::run`] and
 /// [`pack`](super::pack()). While it is made, the images wait in a hidden folder beside `place`, those of a
-/// scan location in one file. After a kill, the same call goes on there. Only the kinds `webdataset`,
+/// scan location in one file. After a kill, the same call goes on there. An earlier package at `place` is
+/// replaced if [`Export::overwrite`] says so. Only the kinds `webdataset`,
 /// `huggingface`, `dust3r`, `wai` and `vggt` can be made like that.
 ///
 /// # Errors
 /// [`Error::Usage`] if it is of another kind, lacks a modality that it needs, or something is in the way; the
 /// errors of [`Export::run`] and [`pack`](super::pack()). A failed run leaves no partial package.
-pub fn pack_scenes(
-    export: &Export,
-    package: &Package,
-    place: &Path,
-    overwrite: bool,
-    ctx: &Context,
-) -> Result<Summary> {
+pub fn pack_scenes(export: &Export, package: &Package, place: &Path, ctx: &Context) -> Result<Summary> {
     let kind = package.kind();
     let needs = Needs::of(kind).ok_or_else(|| {
         let why = "such a package is made from a data set: export, and call `s3d pack`".to_owned();
@@ -69,7 +64,7 @@ pub fn pack_scenes(
     let export = export.keeping(needs.is_used);
     export.check_packable(needs.required, kind.title(), place)?;
 
-    let destination = Destination::begin_of_scenes(ctx, place, overwrite)?;
+    let destination = Destination::begin_of_scenes(ctx, place, export.overwrites())?;
     let work = destination.kept();
     let pack = |data| {
         let source = Source::of(ctx, data, &[], package.images())?;

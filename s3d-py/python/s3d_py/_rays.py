@@ -33,8 +33,10 @@ class Rays:
     @property
     def normal(self) -> npt.NDArray[np.float64]:
         """(…, 3), unit vectors in the world, towards the side that the ray comes from. NaN without a hit."""
-        normal = self.mesh.face_normals[self.face].astype(np.float64)
+        a, b, c = _corners(self.face, self.mesh)
+        normal = np.cross(b - a, c - a)
         normal *= -np.sign((normal * self.directions).sum(-1, keepdims=True))
+        normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
         normal[self.face < 0] = np.nan
         return normal
 
@@ -115,11 +117,16 @@ def as_rays(
     return shape, starts, ways
 
 
+def _corners(face: npt.NDArray[np.int32], mesh: Mesh) -> npt.NDArray[np.float64]:
+    """Returns the corners of faces, (3, …, 3), world metres."""
+    return np.moveaxis(mesh.vertices[mesh.faces[face]].astype(np.float64), -2, 0)
+
+
 def _barycentrics(
     xyz: npt.NDArray[np.floating], face: npt.NDArray[np.int32], mesh: Mesh
 ) -> npt.NDArray[np.float64]:
     """Returns the weights of the corners of faces at places on them."""
-    a, b, c = np.moveaxis(mesh.vertices[mesh.faces[face]].astype(np.float64), -2, 0)
+    a, b, c = _corners(face, mesh)
     normal = np.cross(b - a, c - a)
     area = (normal * normal).sum(-1)
     of_b = (np.cross(xyz - a, c - a) * normal).sum(-1) / area

@@ -121,7 +121,7 @@ class Image:
 
     def at(self: AnImage, size: tuple[int, int] | None = None, *, crop: Window | None = None) -> AnImage:
         """Returns the image in another size, width and height in pixels, and of a view only the part `crop`: x, y,
-        width and height. Its arrays, `K` and `project` are those of the new pixels. Colours are means of the area
+        width and height. Its arrays, `K` and `project` are those of the new pixels. `rgb` is the mean of the area
         that a pixel covers, and all else is that of the old pixel at its centre. `files`, `pose`, `objects` and
         `shares` are those of the whole image, and so are calls of the data set that take an image.
         """
