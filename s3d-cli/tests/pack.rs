@@ -123,6 +123,7 @@ fn scenes_that_cannot_be_packed_are_told_before_the_work() {
     for (more, expected) in [
         (&["--to", "coco"][..], "call `s3d pack`"),
         (&["--to", "dust3r", "--modalities", "rgb,depth"], "--modalities rgb,depth: DUSt3R needs pose"),
+        (&["--to", "huggingface", "--modalities", "global_xyz"], "Hugging Face has no use for them"),
         (&["--to", "webdataset", "--profile", "pointnet"], "--profile pointnet"),
         (&["--to", "webdataset", "--shard", "1/2"], "cannot be used with"),
     ] {

@@ -108,11 +108,17 @@ impl Export {
         self.overwrite
     }
 
-    /// Returns the export of only the modalities that `is_used` tells of.
-    pub(crate) fn keeping(&self, is_used: impl Fn(Domain) -> bool) -> Self {
+    /// Returns the export of only the modalities that `is_used` tells of, for a package for `whom`. Fails if
+    /// none is left.
+    pub(crate) fn keeping(&self, is_used: impl Fn(Domain) -> bool, whom: &str) -> Result<Self> {
         let mut kept = self.clone();
         kept.options.modalities.retain(|domain| is_used(*domain));
-        kept
+        if kept.options.modalities.is_empty() {
+            let value = joined(&self.options.modalities);
+            let why = format!("{whom} has no use for them");
+            return Err(UsageError::InvalidValue { option: "modalities", value, why }.into());
+        }
+        Ok(kept)
     }
 
     /// Refuses what cannot end in a package for `whom` at `place`: an export without the `required`

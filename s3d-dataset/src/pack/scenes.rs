@@ -61,7 +61,7 @@ pub fn pack_scenes(export: &Export, package: &Package, place: &Path, ctx: &Conte
         let why = "such a package is made from a data set: export, and call `s3d pack`".to_owned();
         UsageError::InvalidValue { option: "to", value: kind.to_string(), why }
     })?;
-    let export = export.keeping(needs.is_used);
+    let export = export.keeping(needs.is_used, kind.title())?;
     export.check_packable(needs.required, kind.title(), place)?;
 
     let destination = Destination::begin_of_scenes(ctx, place, export.overwrites())?;
