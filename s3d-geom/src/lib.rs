@@ -58,6 +58,7 @@
 )]
 
 mod aabb;
+mod area_mean;
 mod camera;
 mod cloud;
 mod disjoint_sets;
@@ -79,6 +80,7 @@ mod voxel;
 mod wide;
 
 pub use aabb::Aabb;
+pub use area_mean::area_mean;
 pub use camera::{
     Camera, CameraError, CaptureLens, FisheyeLens, Lens, NormalAxes, PhotoLens, Pose, Projection, Rays,
     SphericalLens, euler_from_rotation, rotation_from_euler,

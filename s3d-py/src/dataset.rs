@@ -2,15 +2,15 @@
 
 use crate::arrays;
 use crate::error::{exception, usage};
-use crate::mesh::Mesh;
+use crate::mesh::{Mesh, raster};
 use crate::work::watched;
-use numpy::{PyArray1, PyArray2, PyArray3};
+use numpy::{PyArray1, PyArray2, PyArray3, PyReadonlyArray3};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use s3d_dataset::parallel::map_in_order;
 use s3d_dataset::{Error, Result};
 use s3d_geom::glam::Vec3;
-use s3d_geom::{NormalAxes, Raster};
+use s3d_geom::{NormalAxes, Raster, area_mean};
 use s3d_io::Error as FileError;
 use s3d_io::dataset::{DatasetImage, Domain, Frame, InstanceEntry as InstanceRecord};
 use s3d_io::image::{PngReader, decode_gray16, decode_rgb8, decode_xyz};
@@ -477,4 +477,18 @@ fn label_index(pixel: [u8; 3]) -> i32 {
     }
     let [r, g, b] = pixel.map(i32::from);
     r << 16 | g << 8 | b
+}
+
+/// Returns the window (x, y, width, height) of an image in another size: see [`area_mean`].
+#[pyfunction]
+pub(crate) fn averaged<'py>(
+    py: Python<'py>,
+    image: PyReadonlyArray3<'_, u8>,
+    window: [u32; 4],
+    size: [u32; 2],
+) -> PyResult<Bound<'py, PyArray3<u8>>> {
+    let image = raster("image", &image)?;
+    let mean = py.detach(|| area_mean(&image, window, size));
+    let outside = || usage(format!("window {window:?} in size {size:?}: not within the image"));
+    arrays::image_of_rows(py, mean.ok_or_else(outside)?)
 }

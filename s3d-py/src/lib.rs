@@ -16,7 +16,6 @@ mod fuse;
 mod mesh;
 mod points;
 mod poses;
-mod resample;
 mod scene;
 mod segments;
 mod work;
@@ -36,7 +35,7 @@ mod native {
     #[pymodule_export]
     use super::command_line::run_command_line;
     #[pymodule_export]
-    use super::dataset::DataSet;
+    use super::dataset::{DataSet, averaged};
     #[pymodule_export]
     use super::detect::Detector;
     #[pymodule_export]
@@ -51,8 +50,6 @@ mod native {
     use super::points::{fill, sample, vote};
     #[pymodule_export]
     use super::poses::read_poses;
-    #[pymodule_export]
-    use super::resample::averaged;
     #[pymodule_export]
     use super::scene::{Scene, encode_png, look_at};
     #[pymodule_export]

@@ -172,8 +172,8 @@ impl Scene {
         Ok(PyArray1::from_vec(py, few_or_many(py, threads, directions.len(), call)?))
     }
 
-    /// Returns the nearest place of the mesh to each point, its distance in metres, and its face; NaN and −1
-    /// for a point that is not finite.
+    /// Returns the nearest place of the mesh to each point, its distance in metres, and its face. They are
+    /// NaN, NaN and −1 for a point that is not finite.
     fn closest<'py>(
         &self,
         py: Python<'py>,

@@ -9,7 +9,6 @@
 pub(crate) mod area;
 pub(crate) mod bundled;
 pub(crate) mod common;
-pub(crate) mod cues;
 pub(crate) mod finish;
 pub(crate) mod images;
 pub(crate) mod input;
@@ -17,7 +16,6 @@ pub(crate) mod job;
 pub(crate) mod labels;
 pub(crate) mod location;
 pub(crate) mod modality;
-pub(crate) mod picture_colors;
 pub(crate) mod plan;
 pub(crate) mod points;
 pub(crate) mod run;

@@ -7,7 +7,6 @@ mod destination;
 mod habitat;
 mod huggingface;
 mod multiview;
-mod near_points;
 mod nerfstudio;
 mod object_table;
 mod options;

@@ -168,9 +168,9 @@ struct About {
 /// entropy of classes. The same data set gives the same bytes.
 ///
 /// # Errors
-/// [`Error::Resolution`] for [`FiguresOptions::dpi`]. [`Error::NoFigure`] if there is nothing to draw. [`Error::Dataset`] if there is no finished data set in
-/// `out`, a file of it or the list of detections is damaged, or `to` cannot be written, or is there and not
-/// to be replaced.
+/// [`Error::Resolution`] for [`FiguresOptions::dpi`]. [`Error::NoFigure`] if there is nothing to draw.
+/// [`Error::Dataset`] if there is no finished data set in `out`, a file of it or the list of detections is
+/// damaged, or `to` cannot be written, or is there and not to be replaced.
 pub fn figures(out: &Path, to: &Path, options: &FiguresOptions, ctx: &Context) -> Result<()> {
     let FiguresOptions { dpi, detections, overwrite } = options;
     if !DPI.contains(dpi) {

@@ -81,8 +81,8 @@ impl ColoredPointWriter {
     /// Gives the file its name, and returns its size in bytes.
     ///
     /// # Errors
-    /// [`Error::Io`](crate::Error::Io); [`Error::Format`](crate::Error::Format) if fewer or more points came than were promised. There is no file
-    /// then.
+    /// [`Error::Io`](crate::Error::Io); [`Error::Format`](crate::Error::Format) if fewer or more points came
+    /// than were promised. There is no file then.
     pub fn finish(self) -> Result<u64> {
         check_count(&self.path, self.promised, self.written)?;
         self.file.commit()

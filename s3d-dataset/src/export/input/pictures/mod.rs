@@ -7,7 +7,7 @@ use crate::context::Context;
 use crate::error::Result;
 use crate::export::input::area::{AreaInput, PictureSet};
 use crate::export::input::cameras::Cameras;
-use crate::export::picture_colors::PictureColors;
+use crate::export::modality::picture_colors::PictureColors;
 use finder::{LocationPictures, PictureFinder, check_sky_box};
 use s3d_geom::Raster;
 use s3d_io::Error as FileError;

@@ -4,14 +4,16 @@
 //! Source: `Pointcept/Pointcept` at d74c646, `pointcept/datasets/preprocessing/concerto/s3dis/` and
 //! `DefaultImagePointDataset` of `pointcept/datasets/defaults.py`.
 
+mod near_points;
+
 use super::destination::Destination;
 use super::multiview::{View, depth_m, views_of};
-use super::near_points::NearPoints;
 use super::pointcept;
 use super::source::Source;
 use crate::context::Context;
 use crate::error::{InputError, Result};
 use crate::parallel::for_each_in_order;
+use near_points::NearPoints;
 use s3d_geom::glam::{DMat4, DVec3};
 use s3d_io::cloud::NpyWriter;
 use s3d_io::dataset::Domain;

@@ -1,8 +1,11 @@
 //! From hits to the bytes of image files, in two steps. `draw` makes the images: some of them together in one
 //! walk over the hits (`together`), the others one after another. `file` encodes each.
 
-use crate::export::cues::CueBuffers;
-use crate::export::picture_colors::PictureColors;
+pub(crate) mod cues;
+pub(crate) mod picture_colors;
+
+use crate::export::modality::cues::CueBuffers;
+use crate::export::modality::picture_colors::PictureColors;
 use half::f16;
 use rayon::prelude::*;
 use s3d_geom::{Camera, Raster};
@@ -77,7 +80,7 @@ pub(crate) enum Image {
     SemanticPretty,
     SemanticClass,
     GlobalXyz,
-    /// A cue: see [`crate::export::cues`].
+    /// A cue: see [`crate::export::modality::cues`].
     Cue(Domain),
 }
 
