@@ -402,9 +402,9 @@ test("when another window changed the labels, they are shown, and the gesture is
 });
 
 test("when the server is gone, a banner says so, and the gesture arrives when it is back", async () => {
+  await page.context().setOffline(true);
   const at = await find(page, small);
   await page.keyboard.press("9");
-  await page.context().setOffline(true);
   await page.mouse.click(at.x, at.y);
   await page.waitForSelector(".banner:not([hidden])");
   assert.match(await page.locator(".saved").textContent(), /gone/);
@@ -417,14 +417,13 @@ test("when the server is gone, a banner says so, and the gesture arrives when it
 });
 
 test("the server's sentence is said when a gesture does not fit", async () => {
+  // In the page itself: Chromium begins to hand requests to the driver a moment after it says so.
+  await page.evaluate(() => {
+    const { fetch } = window;
+    const refused = () => Response.json({ error: "This does <b>not</b> fit." }, { status: 422 });
+    window.fetch = async (path, init) => (path === "gesture" ? refused() : fetch(path, init));
+  });
   const at = await find(page, small);
-  await page.route("**/gesture", (route) =>
-    route.fulfill({
-      status: 422,
-      contentType: "application/json",
-      body: '{"error":"This does <b>not</b> fit."}',
-    }),
-  );
   await page.mouse.click(at.x, at.y);
   await page.waitForFunction(
     () => document.querySelector(".said").textContent === "This does <b>not</b> fit.",
