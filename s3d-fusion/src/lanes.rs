@@ -3,6 +3,9 @@
 //! Choices are made between numbers that are there anyway, or by a factor of 1 or 0. Of a choice between
 //! computed numbers the compiler makes a branch for each lane.
 
+use s3d_geom::ARCTANGENT;
+use std::f32::consts::{FRAC_PI_2, PI};
+
 /// As many as a vector register of AVX2 holds.
 pub(crate) const LANES: usize = 8;
 
@@ -20,9 +23,41 @@ pub(crate) fn floor(number: f32) -> i32 {
     count.wrapping_sub(i32::from(nearest - WHOLE > number))
 }
 
+/// Returns the angles of (x, y) from the first axis, −π to π, with an error below 1e-6; 0 for (0, 0).
+#[inline(always)]
+pub(crate) fn atan2(y: &Lanes, x: &Lanes) -> Lanes {
+    let mut angles = [0.0; LANES];
+    for lane in 0..LANES {
+        let (wide, high) = (x[lane].abs(), y[lane].abs());
+        let share = wide.min(high) / wide.max(high).max(f32::MIN_POSITIVE);
+        let square = share * share;
+        let angle = share
+            * ARCTANGENT
+                .iter()
+                .fold(0.0, |sum, coefficient| sum * square + coefficient);
+        let angle = angle + f32::from(high > wide) * (FRAC_PI_2 - 2.0 * angle);
+        let angle = angle + f32::from(x[lane] < 0.0) * (PI - 2.0 * angle);
+        angles[lane] = angle.copysign(y[lane]);
+    }
+    angles
+}
+
 #[cfg(test)]
 mod tests {
-    use super::floor;
+    use super::*;
+
+    #[test]
+    fn angles_are_those_of_the_library() {
+        let at = |i: i32| [0.0, 1e-30, 0.3 * i as f32, 1e12][i as usize % 4];
+        for (i, j) in (0..200).flat_map(|i| (0..200).map(move |j| (i, j))) {
+            let (y, x) = (at(i), at(j));
+            for (y, x) in [(y, x), (-y, x), (y, -x), (-y, -x)] {
+                let [angle, ..] = atan2(&[y; LANES], &[x; LANES]);
+                let expected = if x == 0.0 && y == 0.0 { 0.0 } else { y.atan2(x) };
+                assert!((angle - expected).abs() < 1e-6, "{y} {x}: {angle} {expected}");
+            }
+        }
+    }
 
     #[test]
     fn floors_are_those_of_the_language() {

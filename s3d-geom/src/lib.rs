@@ -58,6 +58,7 @@
 )]
 
 mod aabb;
+mod arctangent;
 mod area_mean;
 mod camera;
 mod cloud;
@@ -80,6 +81,7 @@ mod voxel;
 mod wide;
 
 pub use aabb::Aabb;
+pub use arctangent::ARCTANGENT;
 pub use area_mean::area_mean;
 pub use camera::{
     Camera, CameraError, CaptureLens, FisheyeLens, Lens, NormalAxes, PhotoLens, Pose, Projection, Rays,

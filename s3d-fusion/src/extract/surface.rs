@@ -100,16 +100,13 @@ impl Surface {
             .iter()
             .scan(0, |sum, part| Some(std::mem::replace(sum, *sum + part.vertices.len())))
             .collect();
-        let mut order: Vec<(u64, u32)> = parts
-            .iter()
-            .flat_map(|part| &part.vertices)
-            .enumerate()
-            .map(|(i, v)| (v.key, i as u32))
-            .collect();
+        let count = parts.iter().map(|part| part.vertices.len()).sum();
+        let mut all = Vec::with_capacity(count);
+        parts.iter().for_each(|part| all.extend_from_slice(&part.vertices));
+        let mut order: Vec<(u64, u32)> = (0..).zip(&all).map(|(i, v)| (v.key, i)).collect();
         order.par_sort_unstable();
 
         // Vertices of the same key are equal: their voxels are.
-        let all: Vec<Vertex> = parts.iter().flat_map(|part| &part.vertices).copied().collect();
         let mut new_of = vec![0; all.len()];
         let mut vertices: Vec<Vertex> = Vec::new();
         for (key, i) in order {
@@ -119,12 +116,15 @@ impl Surface {
             new_of[i as usize] = vertices.len() as u32 - 1;
         }
 
-        let mut faces: Vec<(u64, [u32; 3])> = parts
-            .iter()
-            .zip(&starts)
-            .flat_map(|(part, start)| part.faces.iter().map(move |(cell, face)| (*cell, *face, *start)))
-            .map(|(cell, face, start)| (cell, face.map(|v| new_of[start + v as usize])))
-            .collect();
+        let mut faces = Vec::with_capacity(parts.iter().map(|part| part.faces.len()).sum());
+        for (part, start) in parts.iter().zip(starts) {
+            let new_of = &new_of[start..];
+            faces.extend(
+                part.faces
+                    .iter()
+                    .map(|(cell, face)| (*cell, face.map(|v| new_of[v as usize]))),
+            );
+        }
         // The order of a cell's faces stays.
         faces.par_sort_by_key(|(cell, _)| *cell);
         Self { cell_m, vertices, faces }

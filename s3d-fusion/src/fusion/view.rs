@@ -1,9 +1,9 @@
 //! Which pixels of an image see a voxel, or a box of voxels.
 
-use crate::lanes::floor;
+use crate::lanes::{atan2, floor};
 use crate::range_image::{AngleGrid, Directions, RangeImage, angles_of};
 use s3d_geom::PhotoLens;
-use s3d_geom::glam::{DMat3, DVec3, Vec3};
+use s3d_geom::glam::{DMat3, DVec3};
 
 /// From the world to the pixels of an image.
 pub(crate) struct View<'a> {
@@ -87,12 +87,14 @@ impl<'a> View<'a> {
                 (pixels, *z)
             }
             Projection::Angles(grid) => {
-                let mut ranges = [0.0; 8];
+                let (mut flat, mut ranges) = ([0.0; 8], [0.0; 8]);
                 for k in 0..8 {
-                    let point = Vec3::new(x[k], y[k], z[k]);
-                    ranges[k] = point.dot(point).sqrt();
-                    let [azimuth, elevation] = angles_of(point.as_dvec3());
-                    if let Some([column, row]) = grid.pixel(azimuth, elevation) {
+                    let square = x[k] * x[k] + z[k] * z[k];
+                    (flat[k], ranges[k]) = (square.sqrt(), (square + y[k] * y[k]).sqrt());
+                }
+                let (azimuths, elevations) = (atan2(x, z), atan2(y, &flat));
+                for k in 0..8 {
+                    if let Some([column, row]) = grid.pixel(azimuths[k].into(), elevations[k].into()) {
                         pixels[k] = row * self.size[0] + column;
                     }
                 }

@@ -1,5 +1,6 @@
 //! Grids of directions: a column has one azimuth, a row one elevation.
 
+use rayon::prelude::*;
 use s3d_geom::glam::{DVec2, DVec3, dvec2, dvec3};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -23,6 +24,8 @@ struct Axis {
     first_rad: f64,
 }
 
+/// Rows that are summed at a time.
+const ROWS: usize = 64;
 /// No column or row.
 const NONE: u32 = u32::MAX;
 /// Bins for each step between two angles.
@@ -48,16 +51,27 @@ impl AngleGrid {
     /// Returns the grid of a scan with columns and rows of points about the scanner, row by row, NaN where
     /// nothing was measured. Returns `None` if the columns or rows do not have one angle each.
     pub(crate) fn of_scan([columns, rows]: [u32; 2], points: &[DVec3]) -> Option<Self> {
-        let mut along = vec![DVec2::ZERO; columns as usize];
-        let mut down = vec![DVec2::ZERO; rows as usize];
-        for (i, p) in points
-            .iter()
-            .enumerate()
-            .filter(|(_, p)| p.is_finite() && **p != DVec3::ZERO)
-        {
-            let p = *p / p.length();
-            along[i % columns as usize] += dvec2(p.z, p.x);
-            down[i / columns as usize] += dvec2(libm::hypot(p.x, p.z), p.y);
+        // By bands of rows, so that the sums are the same for any number of threads.
+        let width = columns as usize;
+        let bands: Vec<_> = points
+            .par_chunks(width.max(1) * ROWS)
+            .map(|band| {
+                let (mut along, mut down) = (vec![DVec2::ZERO; width], vec![DVec2::ZERO; band.len() / width]);
+                for (i, p) in band.iter().enumerate() {
+                    if p.is_finite() && *p != DVec3::ZERO {
+                        let p = *p / p.length();
+                        along[i % width] += dvec2(p.z, p.x);
+                        down[i / width] += dvec2((p.x * p.x + p.z * p.z).sqrt(), p.y);
+                    }
+                }
+                (along, down)
+            })
+            .collect();
+        let mut along = vec![DVec2::ZERO; width];
+        let mut down = Vec::with_capacity(rows as usize);
+        for (of_columns, of_rows) in bands {
+            along.iter_mut().zip(of_columns).for_each(|(sum, more)| *sum += more);
+            down.extend(of_rows);
         }
 
         let columns = Axis::of_sums(&along, [-PI, PI])?;

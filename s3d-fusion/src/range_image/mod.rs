@@ -10,6 +10,7 @@ mod world;
 
 use crate::{FusionError, SensorNoise};
 pub(crate) use angles::{AngleGrid, angles_of};
+use rayon::prelude::*;
 pub(crate) use rays::Rays;
 use s3d_geom::glam::{DVec3, Vec3, dvec2};
 use s3d_geom::{PhotoLens, Pose, Raster};
@@ -112,12 +113,13 @@ impl RangeImage {
         let Some(grid) = AngleGrid::of_scan([columns, rows], &local) else {
             return Self::from_local(pose, &local, colors, noise);
         };
-        let mut offsets = vec![[0; 2]; local.len()];
-        for (i, p) in local.iter().enumerate().filter(|(_, p)| p.is_finite()) {
+        let offset = |(i, p): (usize, &DVec3)| {
             let pixel = [i as u32 % columns, i as u32 / columns];
-            offsets[i] = grid.offset(pixel, *p);
-        }
-        let ranges = Raster::from_vec(columns, rows, local.iter().map(|p| p.length() as f32).collect());
+            if p.is_finite() { grid.offset(pixel, *p) } else { [0; 2] }
+        };
+        let offsets = local.par_iter().enumerate().map(offset).collect();
+        let ranges = local.par_iter().map(|p| p.length() as f32).collect();
+        let ranges = Raster::from_vec(columns, rows, ranges);
         let image = Self::checked(pose, Directions::Angles(grid), ranges, offsets, noise)?;
         Ok(Self { colors: colors.to_vec(), ..image })
     }

@@ -14,18 +14,30 @@ pub(crate) fn number(word: &[u8]) -> Option<f32> {
     short_number(word).or_else(|| std::str::from_utf8(word).ok()?.parse().ok())
 }
 
+/// Returns the number that a word spells, finite or not, as [`number`] does, in `f64`.
+#[inline]
+pub(crate) fn double(word: &[u8]) -> Option<f64> {
+    short_double(word).or_else(|| std::str::from_utf8(word).ok()?.parse().ok())
+}
+
 /// The powers of ten that `f64` holds exactly.
 const POWERS: [f64; 15] = [1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14];
 
-/// Returns the number of a plain decimal fraction that has up to 15 characters after the sign, as nearly all
-/// have.
+/// Returns the number of a short word, as [`short_double`] does, in `f32`.
 ///
-/// The digits and the power of ten are exact in `f64`, so their quotient is rounded once. Rounding the
-/// quotient to `f32` gives the `f32` nearest to the fraction, unless the quotient lies exactly halfway
-/// between two `f32` values: in all other cases fraction and quotient lie on the same side of the halfway
-/// point.
+/// Rounding the `f64` gives the `f32` nearest to the fraction, unless the `f64` lies exactly halfway between
+/// two `f32` values: in all other cases fraction and `f64` lie on the same side of the halfway point.
 #[inline]
 fn short_number(word: &[u8]) -> Option<f32> {
+    let value = short_double(word)?;
+    let between = value.to_bits() & 0x1fff_ffff == 0x1000_0000;
+    (!between).then_some(value as f32)
+}
+
+/// Returns the number of a plain decimal fraction that has up to 15 characters after the sign, as nearly all
+/// have. The digits and the power of ten are exact in `f64`, so their quotient is rounded once.
+#[inline]
+fn short_double(word: &[u8]) -> Option<f64> {
     let negative = word.first() == Some(&b'-');
     let written = word.strip_prefix(b"-").unwrap_or(word);
     if written.len() > 15 {
@@ -49,8 +61,7 @@ fn short_number(word: &[u8]) -> Option<f32> {
     }
 
     let value = digits as f64 / POWERS.get(decimals)?;
-    let between = value.to_bits() & 0x1fff_ffff == 0x1000_0000;
-    (!between).then_some(if negative { -value } else { value } as f32)
+    Some(if negative { -value } else { value })
 }
 
 #[cfg(test)]
@@ -96,6 +107,13 @@ mod tests {
                 found.to_bits() == expected.to_bits() || found.is_nan() && expected.is_nan(),
                 "{word}: {found}"
             );
+
+            let expected: f64 = word.parse().unwrap();
+            let found = double(word.as_bytes()).unwrap();
+            assert!(
+                found.to_bits() == expected.to_bits() || found.is_nan() && expected.is_nan(),
+                "{word}: {found}"
+            );
         }
 
         for word in ["", "-", ".", "-.", "1.2.3", "1,5", "--1", "0x10", "1_0", "1.5f", "\u{661}"] {
@@ -116,6 +134,9 @@ mod tests {
                 let word = &word[from..];
                 prop_assert_eq!(
                     number(word.as_bytes()).map(f32::to_bits), word.parse().ok().map(f32::to_bits), "{}", word
+                );
+                prop_assert_eq!(
+                    double(word.as_bytes()).map(f64::to_bits), word.parse().ok().map(f64::to_bits), "{}", word
                 );
             }
         }

@@ -206,22 +206,11 @@ impl Kernel for PhotographKernel<'_> {
 /// Returns the angle of (x, y) from the first axis, −π to π, with an error below 5e-7; 0 for (0, 0).
 #[inline(always)]
 fn atan2<L: ShadeLanes>(l: L, y: L::F, x: L::F) -> L::F {
-    // The coefficients minimise the largest error of a·p(a²) for 0 ≤ a ≤ 1: 4e-8.
-    const COEFFICIENTS: [f32; 8] = [
-        -0.004_056_03,
-        0.021_868_023,
-        -0.055_919_29,
-        0.096_426_81,
-        -0.139_088_08,
-        0.199_465_99,
-        -0.333_298_63,
-        0.999_999_34,
-    ];
     let zero = l.splat(0.0);
     let (wide, high) = (l.max(x, l.sub(zero, x)), l.max(y, l.sub(zero, y)));
     let a = l.div(l.min(wide, high), l.max(l.max(wide, high), l.splat(f32::MIN_POSITIVE)));
     let (aa, mut p) = (l.mul(a, a), zero);
-    for coefficient in COEFFICIENTS {
+    for coefficient in s3d_geom::ARCTANGENT {
         p = l.add(l.mul(p, aa), l.splat(coefficient));
     }
     let angle = l.mul(p, a);

@@ -5,10 +5,11 @@
 use crate::cloud::pcd::header::{Data, PcdField, PcdHeader};
 use crate::cloud::pcd::lzf::Lzf;
 use crate::cloud::table::cloud::{Cloud, ColorRange};
+use crate::cloud::table::line_block::{LineBlock, parse_lines};
 use crate::cloud::table::records::{Field, Kind, Part, Table};
 use crate::cloud::table::rows::Reading;
 use crate::cloud::table::wanted::Wanted;
-use crate::cloud::table::words::{Lines, Parsed, Separator, WordTable, is_packed};
+use crate::cloud::table::words::{Lines, Separator, WordTable, is_packed};
 use crate::error::{Error, Result};
 use crate::fs::source::{Bytes, Source};
 use std::cell::Cell;
@@ -60,22 +61,29 @@ impl<'a> PcdCloud<'a> {
 
         let mut done = 0u64;
         let mut holes = 0u64;
-        while done < header.points {
-            let Some(line) = lines.next()? else {
+        let next = |block: &mut LineBlock| {
+            if done == header.points {
+                return Ok(false);
+            }
+            if lines.next()?.is_none() {
                 let message = format!("has {} POINTS, and {done} are there: it is cut short", header.points);
                 return Err(Error::format(path, message));
-            };
-            if line.is_empty() {
-                continue;
             }
-
-            done = done.saturating_add(1);
-            match table.parse(lines.line(), colors) {
-                Parsed::Row(row) if row.position.is_nan() => holes = holes.saturating_add(1),
-                Parsed::Row(row) => reading.push_line(lines.number(), &row)?,
-                Parsed::Wider => return Ok(false),
-                Parsed::Fault(why) => reading.fault(Error::line(path, lines.number(), why))?,
+            if !lines.line().is_empty() {
+                done = done.saturating_add(1);
+                block.push(lines.number(), lines.line());
             }
+            Ok(true)
+        };
+        let is_narrow = parse_lines(path, &table, colors, reading, next, |reading, place, row| {
+            if row.position.is_nan() {
+                holes = holes.saturating_add(1);
+                return Ok(());
+            }
+            reading.push_line(place.line, row)
+        })?;
+        if !is_narrow {
+            return Ok(false);
         }
 
         // PCL reads no more either.

@@ -3,6 +3,8 @@
 pub(crate) mod cloud;
 pub(crate) mod columns;
 mod gathered;
+#[cfg(any(feature = "pcd", feature = "text"))]
+pub(crate) mod line_block;
 pub(crate) mod meaning;
 pub(crate) mod measured;
 mod points;

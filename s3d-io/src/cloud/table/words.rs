@@ -10,6 +10,7 @@ use crate::cloud::table::rows::{Row, Value};
 use crate::cloud::table::wanted::Wanted;
 use crate::error::{Error, Result};
 use crate::fs::quote::quote;
+use crate::fs::text::double;
 use s3d_geom::glam::dvec3;
 use std::io::{BufRead, Read};
 use std::path::{Path, PathBuf};
@@ -117,10 +118,9 @@ impl Separator {
 
     /// Returns the number that a word spells, finite or not. Between semicolons, it may have a decimal comma.
     pub(crate) fn number(self, word: &[u8]) -> Option<f64> {
-        let text = std::str::from_utf8(word).ok()?;
-        let plain = text.parse().ok();
+        let plain = double(word);
         if plain.is_none() && self == Self::One(b';') {
-            return text.replace(',', ".").parse().ok();
+            return std::str::from_utf8(word).ok()?.replace(',', ".").parse().ok();
         }
         plain
     }

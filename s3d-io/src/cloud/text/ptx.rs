@@ -3,10 +3,11 @@
 #![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
 
 use crate::cloud::table::cloud::ColorRange;
+use crate::cloud::table::line_block::{LineBlock, parse_lines};
 use crate::cloud::table::measured::{Measured, Told};
 use crate::cloud::table::rows::{Reading, Row};
 use crate::cloud::table::wanted::{Wanted, usual_names};
-use crate::cloud::table::words::{Lines, Parsed};
+use crate::cloud::table::words::Lines;
 use crate::cloud::text::layout::Layout;
 use crate::cloud::text::read::TextFile;
 use crate::error::{Error, Result};
@@ -177,27 +178,30 @@ pub(super) fn read_ptx(
         scans = scans.saturating_add(1);
         reading.told = Told { has_grid: true, ..table.told(Some(scan.points)) };
         let mut done = 0u64;
-        while done < scan.points {
+        let next = |block: &mut LineBlock| {
+            if done == scan.points {
+                return Ok(false);
+            }
             if lines.next()?.is_none() {
                 return Err(cut_short(path, done, &scan));
             }
-            let line = lines.line();
-            if line.is_empty() {
-                continue;
+            if !lines.line().is_empty() {
+                done = done.saturating_add(1);
+                block.push(lines.number(), lines.line());
             }
-
-            let cell = scan.cell(done);
-            done = done.saturating_add(1);
-            match table.parse(line, colors) {
-                Parsed::Row(row) if row.position == DVec3::ZERO => empty = empty.saturating_add(1),
-                Parsed::Row(row) => {
-                    let position = scan.pose.transform_point3(row.position);
-                    let measured = Measured { cell, ..row.measured };
-                    reading.push_line(lines.number(), &Row { position, measured, ..row })?;
-                }
-                Parsed::Wider => return Ok(false),
-                Parsed::Fault(why) => reading.fault(Error::line(path, lines.number(), why))?,
+            Ok(true)
+        };
+        let is_narrow = parse_lines(path, &table, colors, reading, next, |reading, place, row| {
+            if row.position == DVec3::ZERO {
+                empty = empty.saturating_add(1);
+                return Ok(());
             }
+            let position = scan.pose.transform_point3(row.position);
+            let measured = Measured { cell: scan.cell(place.index), ..row.measured };
+            reading.push_line(place.line, &Row { position, measured, ..*row })
+        })?;
+        if !is_narrow {
+            return Ok(false);
         }
         points = points.saturating_add(done);
     }

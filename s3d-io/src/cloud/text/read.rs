@@ -3,9 +3,10 @@
 #![cfg_attr(not(test), deny(clippy::arithmetic_side_effects, clippy::cast_possible_truncation))]
 
 use crate::cloud::table::cloud::{Cloud, ColorRange};
+use crate::cloud::table::line_block::{LineBlock, parse_lines};
 use crate::cloud::table::rows::Reading;
 use crate::cloud::table::wanted::{Wanted, usual_names};
-use crate::cloud::table::words::{Lines, Parsed};
+use crate::cloud::table::words::Lines;
 use crate::cloud::text::layout::{Layout, count_of, is_comment};
 use crate::cloud::text::ptx::read_ptx;
 use crate::error::{Error, Result};
@@ -54,11 +55,13 @@ impl<'a> TextCloud<'a> {
         // The points that the last count states, and how many of them came.
         let mut stated = layout.count;
         let mut done = 0u64;
-        while lines.next()?.is_some() {
-            let number = lines.number();
-            let line = lines.line();
+        let next = |block: &mut LineBlock| {
+            if lines.next()?.is_none() {
+                return Ok(false);
+            }
+            let (number, line) = (lines.number(), lines.line());
             if number < layout.first || line.is_empty() || is_comment(line) {
-                continue;
+                return Ok(true);
             }
             // A PTS file may hold several scans, each with its count.
             if stated == Some(done)
@@ -66,15 +69,18 @@ impl<'a> TextCloud<'a> {
             {
                 stated = Some(points);
                 done = 0;
-                continue;
+                return Ok(true);
             }
 
             done = done.saturating_add(1);
-            match table.parse(line, colors) {
-                Parsed::Row(row) => reading.push_line(number, &row)?,
-                Parsed::Wider => return Ok(false),
-                Parsed::Fault(why) => reading.fault(Error::line(path, number, why))?,
-            }
+            block.push(number, line);
+            Ok(true)
+        };
+        let is_narrow = parse_lines(path, &table, colors, reading, next, |reading, place, row| {
+            reading.push_line(place.line, row)
+        })?;
+        if !is_narrow {
+            return Ok(false);
         }
 
         match stated {
