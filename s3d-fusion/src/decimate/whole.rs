@@ -6,7 +6,6 @@ use super::quadric::Quadric;
 use crate::columns::MeshColumns;
 use rayon::prelude::*;
 use s3d_geom::glam::{DVec3, Vec3};
-use std::collections::BTreeSet;
 
 /// The whole mesh. Faces and vertices keep their numbers and are dropped at the end.
 pub(super) struct Whole {
@@ -129,10 +128,18 @@ impl Whole {
             let triangle = self.faces[face as usize].map(|v| self.positions[v as usize]);
             f64::from(to_triangle(sample.at, triangle).0)
         };
-        let pairs = self.samples.iter().zip(&self.face_of_sample);
-        let (worst, sum) = pairs
-            .map(squared)
-            .fold((0.0, 0.0), |(worst, sum), d| (f64::max(worst, d), sum + d));
+        let worse = |(worst, sum): (f64, f64), (d, more): (f64, f64)| (worst.max(d), sum + more);
+        let some = self
+            .samples
+            .par_chunks(AT_ONCE)
+            .zip(self.face_of_sample.par_chunks(AT_ONCE));
+        let parts: Vec<(f64, f64)> = some
+            .map(|(samples, faces)| {
+                let each = samples.iter().zip(faces).map(squared);
+                each.fold((0.0, 0.0), |all, d| worse(all, (d, d)))
+            })
+            .collect();
+        let (worst, sum) = parts.into_iter().fold((0.0, 0.0), worse);
         [worst.sqrt(), (sum / self.samples.len().max(1) as f64).sqrt()]
     }
 
@@ -147,8 +154,10 @@ impl Whole {
         go_on: &mut dyn FnMut(f64) -> bool,
     ) -> Option<()> {
         let cell = |p: &Vec3| (p.as_dvec3() / cell_m + shift).floor().as_ivec3().to_array();
-        let numbers: BTreeSet<[i32; 3]> = self.positions.iter().map(cell).collect();
-        let numbers: Vec<[i32; 3]> = numbers.into_iter().collect();
+        let mut numbers: Vec<[i32; 3]> = self.positions.par_iter().map(cell).collect();
+        numbers.dedup();
+        numbers.par_sort_unstable();
+        numbers.dedup();
         let number = |p: &Vec3| {
             let cell = cell(p);
             numbers.partition_point(|n| *n < cell) as u32
@@ -317,6 +326,9 @@ impl Whole {
         }
     }
 }
+
+/// Samples that a thread measures at a time.
+const AT_ONCE: usize = 1 << 16;
 
 /// How many pieces a thread takes before all of them are taken over. It decides how much memory they take.
 const PIECES_A_THREAD: usize = 8;
