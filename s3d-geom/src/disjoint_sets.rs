@@ -6,20 +6,27 @@
 /// use s3d_geom::DisjointSets;
 ///
 /// let mut sets = DisjointSets::new(4);
-/// let (a, b) = (sets.root(1), sets.root(3));
-/// sets.join(a, b);
+/// sets.unite(3, 1);
+/// assert_eq!(sets.root(3), 1);
 /// assert_eq!(sets.numbered(), (vec![0, 1, 2, 1], 3));
 /// ```
 ///
 /// # Panics
 /// All methods panic at a number that is in no set.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct DisjointSets(Vec<u32>);
 
 impl DisjointSets {
     /// Makes a set of each number below `len`.
     pub fn new(len: usize) -> Self {
         Self((0..len as u32).collect())
+    }
+
+    /// Adds a set of one more number, and returns that.
+    pub fn add(&mut self) -> u32 {
+        let number = self.0.len() as u32;
+        self.0.push(number);
+        number
     }
 
     /// Returns the number that stands for the set of `of`.
@@ -39,6 +46,19 @@ impl DisjointSets {
     #[inline]
     pub fn join(&mut self, root: u32, other: u32) {
         self.0[other as usize] = root;
+    }
+
+    /// Joins the sets of two numbers. The lower of their roots stands for both: the first member, if sets are
+    /// joined in no other way.
+    #[inline]
+    pub fn unite(&mut self, a: u32, b: u32) {
+        let [a, b] = [self.root(a), self.root(b)];
+        self.join(a.min(b), a.max(b));
+    }
+
+    /// Returns the root of each number.
+    pub fn roots(mut self) -> Vec<u32> {
+        (0..self.0.len() as u32).map(|member| self.root(member)).collect()
     }
 
     /// Returns the set of each number, and the number of sets. Sets are numbered from 0, by their first

@@ -74,6 +74,7 @@ mod raster;
 mod simplify;
 #[cfg(feature = "sampling")]
 mod surface;
+mod symmetric_eigen;
 #[cfg(feature = "nearest")]
 mod vertex_colors;
 mod voxel;
@@ -106,6 +107,7 @@ pub use raster::Raster;
 pub use simplify::{SimplifiedMesh, simplify};
 #[cfg(feature = "sampling")]
 pub use surface::{Density, SurfaceSampler};
+pub use symmetric_eigen::symmetric_eigen;
 #[cfg(feature = "nearest")]
 pub use vertex_colors::{ColoredVertices, VertexColors};
 pub use voxel::{VoxelGrid, Voxels};

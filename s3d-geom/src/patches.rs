@@ -1,6 +1,6 @@
 //! Connected faces.
 
-use crate::TriMesh;
+use crate::{DisjointSets, TriMesh};
 use std::collections::{BTreeMap, HashMap};
 use std::hash::Hash;
 
@@ -23,40 +23,20 @@ use std::hash::Hash;
 /// # Panics
 /// If the mesh does not have one of `faces`.
 pub fn face_patches<K: Copy + Eq + Hash>(mesh: &TriMesh, faces: &[(u32, K)]) -> Vec<Vec<usize>> {
-    // A union-find forest: the root of a patch is its first face.
-    let mut first: Vec<usize> = (0..faces.len()).collect();
-    let mut at_corner: HashMap<([u32; 3], K), usize> = HashMap::new();
-    for (place, (face, key)) in faces.iter().enumerate() {
+    // The root of a patch is its first face.
+    let mut patches = DisjointSets::new(faces.len());
+    let mut at_corner: HashMap<([u32; 3], K), u32> = HashMap::new();
+    for (place, (face, key)) in (0..).zip(faces) {
         for corner in mesh.triangle(*face) {
             // Adding 0 turns −0 into 0.
             let corner = (corner + 0.0).to_array().map(f32::to_bits);
-            let other = *at_corner.entry((corner, *key)).or_insert(place);
-            let a = root(&mut first, place);
-            let b = root(&mut first, other);
-            if let Some(later) = first.get_mut(a.max(b)) {
-                *later = a.min(b);
-            }
+            patches.unite(place, *at_corner.entry((corner, *key)).or_insert(place));
         }
     }
 
-    let mut members: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
-    for place in 0..faces.len() {
-        members.entry(root(&mut first, place)).or_default().push(place);
+    let mut members: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
+    for (place, root) in patches.roots().into_iter().enumerate() {
+        members.entry(root).or_default().push(place);
     }
     members.into_values().collect()
-}
-
-/// Returns the first face of the patch to which the face at `place` belongs.
-fn root(first: &mut [usize], mut place: usize) -> usize {
-    while let Some(&parent) = first.get(place)
-        && parent != place
-    {
-        // Path halving: shortens the way for later calls.
-        let grandparent = first.get(parent).copied().unwrap_or(parent);
-        if let Some(entry) = first.get_mut(place) {
-            *entry = grandparent;
-        }
-        place = grandparent;
-    }
-    place
 }

@@ -1,7 +1,7 @@
 //! Which faces hang together.
 
 use super::cells::{Cell, Cells, rows_after};
-use s3d_geom::TriMesh;
+use s3d_geom::{DisjointSets, TriMesh};
 
 /// Faces that hang together, and their area.
 #[derive(Clone, Debug)]
@@ -17,15 +17,14 @@ pub(super) fn pieces(mesh: &TriMesh, cells: &Cells, faces: &[u32]) -> Vec<Piece>
     occupied.sort_unstable();
     occupied.dedup();
 
-    let mut sets: Vec<u32> = (0..occupied.len() as u32).collect();
+    let mut sets = DisjointSets::new(occupied.len());
     for (place, cell) in (0u32..).zip(&occupied) {
         let after = &occupied[place as usize..];
         for [first, last] in rows_after(*cell) {
             let begin = after.partition_point(|other| *other < first);
             let touching = after[begin..].iter().take_while(|other| **other <= last);
             for (other, _) in (place + begin as u32..).zip(touching) {
-                let [a, b] = [root(&mut sets, place), root(&mut sets, other)];
-                sets[a.max(b) as usize] = a.min(b);
+                sets.unite(place, other);
             }
         }
     }
@@ -38,7 +37,7 @@ pub(super) fn pieces(mesh: &TriMesh, cells: &Cells, faces: &[u32]) -> Vec<Piece>
             .of(face)
             .first()
             .map_or(0, |cell| occupied.partition_point(|other| other < cell));
-        let set = root(&mut sets, place as u32) as usize;
+        let set = sets.root(place as u32) as usize;
         let piece = *piece_of_set[set].get_or_insert_with(|| {
             found.push(Piece { faces: Vec::new(), area_m2: 0.0 });
             found.len() - 1
@@ -48,17 +47,6 @@ pub(super) fn pieces(mesh: &TriMesh, cells: &Cells, faces: &[u32]) -> Vec<Piece>
     }
     found.sort_by(|a, b| b.area_m2.total_cmp(&a.area_m2));
     found
-}
-
-/// The first member of a set.
-fn root(sets: &mut [u32], mut at: u32) -> u32 {
-    while sets[at as usize] != at {
-        // Path halving: shortens the way for later calls.
-        let grandparent = sets[sets[at as usize] as usize];
-        sets[at as usize] = grandparent;
-        at = grandparent;
-    }
-    at
 }
 
 #[cfg(test)]

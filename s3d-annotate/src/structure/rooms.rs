@@ -3,6 +3,7 @@
 use super::distance::distances;
 use super::scan::Scan;
 use super::storey::Storey;
+use s3d_geom::DisjointSets;
 
 /// Half of the width of the widest door without a lintel, metres.
 const WIDEST_DOOR_M: f64 = 0.68;
@@ -53,8 +54,9 @@ pub(super) fn rooms(scan: &Scan, storey: &Storey) -> (Vec<u32>, u32) {
             basin_of[cell] = basins.add(here_m);
             continue;
         };
-        basin_of[cell] = basins.root(basin_of[up]);
-        let mut meeting: Vec<u32> = reached.iter().map(|next| basins.root(basin_of[*next])).collect();
+        basin_of[cell] = basins.sets.root(basin_of[up]);
+        let roots = reached.iter().map(|next| basins.sets.root(basin_of[*next]));
+        let mut meeting: Vec<u32> = roots.collect();
         meeting.sort_unstable_by(|a, b| basins.by_peak(*a, *b));
         meeting.dedup();
         let Some((&first, others)) = meeting.split_first() else { continue };
@@ -62,7 +64,7 @@ pub(super) fn rooms(scan: &Scan, storey: &Storey) -> (Vec<u32>, u32) {
             let lower_m = basins.peak_m[other as usize];
             let is_door = here_m <= WIDEST_DOOR_M && here_m < NARROW * lower_m && lower_m >= LEAST_RADIUS_M;
             if !is_door {
-                basins.parent[other as usize] = first;
+                basins.sets.join(first, other);
             }
         }
     }
@@ -71,13 +73,13 @@ pub(super) fn rooms(scan: &Scan, storey: &Storey) -> (Vec<u32>, u32) {
         *basin = if *basin == u32::MAX {
             u32::MAX
         } else {
-            basins.root(*basin)
+            basins.sets.root(*basin)
         };
     }
     cut_strips(scan, &distance, &mut basin_of);
 
     // What is too small, or has no floor, is no room.
-    let mut tally = vec![Tally::default(); basins.parent.len()];
+    let mut tally = vec![Tally::default(); basins.peak_m.len()];
     for cell in 0..distance.len() {
         if basin_of[cell] == u32::MAX {
             continue;
@@ -169,24 +171,14 @@ fn around(scan: &Scan, cell: usize) -> impl Iterator<Item = usize> {
 /// basins has the widest.
 #[derive(Default)]
 struct Basins {
-    parent: Vec<u32>,
+    sets: DisjointSets,
     peak_m: Vec<f64>,
 }
 
 impl Basins {
     fn add(&mut self, peak_m: f64) -> u32 {
-        self.parent.push(self.parent.len() as u32);
         self.peak_m.push(peak_m);
-        self.parent.len() as u32 - 1
-    }
-
-    fn root(&mut self, mut basin: u32) -> u32 {
-        while self.parent[basin as usize] != basin {
-            let above = self.parent[self.parent[basin as usize] as usize];
-            self.parent[basin as usize] = above;
-            basin = above;
-        }
-        basin
+        self.sets.add()
     }
 
     /// Orders basins, the widest first.

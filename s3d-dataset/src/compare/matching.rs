@@ -2,6 +2,7 @@
 
 use super::comparison::Side;
 use super::names::{MISSING, NULL};
+use s3d_geom::DisjointSets;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Instances are the same thing if they share at least this part of their surface: intersection over union.
@@ -146,19 +147,17 @@ impl Matching {
     /// that share too little to be partners. The largest of a group comes first.
     pub(crate) fn groups(&self, has: impl Fn(Side, u32) -> bool) -> Vec<[Vec<u32>; 2]> {
         let count = self.partners[0].len();
-        // A union-find forest: the root of a group is its first instance, and those of B come after A's.
-        let mut first: Vec<usize> = (0..2 * count).collect();
+        // The root of a group is its first instance, and those of B come after A's.
+        let mut sets = DisjointSets::new(2 * count);
         let partners = (0..).zip(&self.partners[0]).filter_map(|(a, b)| Some((a, (*b)?)));
         for (a, b) in partners.chain(self.parts.iter().copied()) {
-            let a = root(&first, a as usize);
-            let b = root(&first, count + b as usize);
-            first[a.max(b)] = a.min(b);
+            sets.unite(a, count as u32 + b);
         }
 
-        let mut groups: BTreeMap<usize, [Vec<u32>; 2]> = BTreeMap::new();
-        for (side, offset) in [(Side::A, 0), (Side::B, count)] {
+        let mut groups: BTreeMap<u32, [Vec<u32>; 2]> = BTreeMap::new();
+        for (side, offset) in [(Side::A, 0), (Side::B, count as u32)] {
             for number in (0..count as u32).filter(|number| is_instance(*number) && has(side, *number)) {
-                let group = groups.entry(root(&first, offset + number as usize)).or_default();
+                let group = groups.entry(sets.root(offset + number)).or_default();
                 group[side as usize].push(number);
             }
         }
@@ -198,14 +197,6 @@ fn own_surfaces(on: &SharedSurface, split: impl Fn((u32, u32)) -> (u32, u32)) ->
         }
     }
     all
-}
-
-/// The first instance of the group to which an instance belongs.
-fn root(first: &[usize], mut place: usize) -> usize {
-    while first[place] != place {
-        place = first[place];
-    }
-    place
 }
 
 #[cfg(test)]

@@ -3,8 +3,8 @@
 pub mod index;
 pub mod volume;
 
-use glam::{DVec3, Vec3};
-use s3d_geom::{Aabb, PointCloud};
+use glam::{DMat3, DVec3, Vec3};
+use s3d_geom::{Aabb, PointCloud, symmetric_eigen};
 
 /// The width of a cell in metres: chosen here, half a step of the sliding windows.
 pub const CELL_M: f32 = 0.05;
@@ -196,39 +196,16 @@ fn order(k: [i32; 3]) -> [i32; 3] {
 }
 
 /// Returns the eigenvector of the least eigenvalue of a covariance (xx, xy, xz, yy, yz, zz), and the share of
-/// this eigenvalue in the sum of all three. Uses Jacobi rotations.
+/// this eigenvalue in the sum of all three.
 fn least_direction([xx, xy, xz, yy, yz, zz]: [f64; 6]) -> (DVec3, f64) {
-    let mut a = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]];
-    let mut v = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    let (values, axes) = symmetric_eigen(&DMat3::from_cols_array(&[xx, xy, xz, xy, yy, yz, xz, yz, zz]));
     let trace = xx + yy + zz;
-
-    for _ in 0..12 {
-        for (p, q) in [(0, 1), (0, 2), (1, 2)] {
-            if a[p][q].abs() <= 1e-15 * trace {
-                continue;
-            }
-            let theta = (a[q][q] - a[p][p]) / (2.0 * a[p][q]);
-            let t = theta.signum() / (theta.abs() + (theta * theta + 1.0).sqrt());
-            let c = 1.0 / (t * t + 1.0).sqrt();
-            let s = t * c;
-
-            for row in &mut a {
-                (row[p], row[q]) = (c * row[p] - s * row[q], s * row[p] + c * row[q]);
-            }
-            for k in 0..3 {
-                (a[p][k], a[q][k]) = (c * a[p][k] - s * a[q][k], s * a[p][k] + c * a[q][k]);
-                (v[k][p], v[k][q]) = (c * v[k][p] - s * v[k][q], s * v[k][p] + c * v[k][q]);
-            }
-        }
-    }
-
-    let least = (0..3).fold(0, |least, i| if a[i][i] < a[least][least] { i } else { least });
     let share = if trace > 0.0 {
-        (a[least][least] / trace).clamp(0.0, 1.0 / 3.0)
+        (values.x / trace).clamp(0.0, 1.0 / 3.0)
     } else {
         0.0
     };
-    (DVec3::new(v[0][least], v[1][least], v[2][least]), share)
+    (axes.x_axis, share)
 }
 
 #[cfg(test)]

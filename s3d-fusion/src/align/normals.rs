@@ -2,7 +2,8 @@
 
 use crate::register::cell;
 use rayon::prelude::*;
-use s3d_geom::glam::{DVec3, Vec3};
+use s3d_geom::glam::{DMat3, DVec3, Vec3};
+use s3d_geom::symmetric_eigen;
 
 /// Points with the directions that they look in, if those are known, found by cubes.
 pub(super) struct Neighbours<'a> {
@@ -112,50 +113,14 @@ fn plane(points: &[DVec3], weights: &[f64]) -> Option<(DVec3, DVec3, [f64; 3])> 
         return None;
     }
     let middle = points.iter().zip(weights).map(|(p, w)| *p * *w).sum::<DVec3>() / total;
-    let mut squares = [[0.0; 3]; 3];
+    let mut squares = DMat3::ZERO;
     for (p, weight) in points.iter().zip(weights) {
-        let d = (*p - middle).to_array();
-        for row in 0..3 {
-            for column in 0..3 {
-                squares[row][column] += weight * d[row] * d[column] / total;
-            }
-        }
+        let d = *p - middle;
+        let weighted = d * (weight / total);
+        squares += DMat3::from_cols(weighted * d.x, weighted * d.y, weighted * d.z);
     }
-    let (spreads, normal) = least_axis(squares);
-    Some((middle, normal, spreads))
-}
-
-/// The eigenvalues of a symmetric matrix, ascending, and the unit vector of the least, by Jacobi's rotations.
-fn least_axis(mut m: [[f64; 3]; 3]) -> ([f64; 3], DVec3) {
-    let mut axes = [DVec3::X, DVec3::Y, DVec3::Z];
-    for _ in 0..12 {
-        let off = m[0][1].abs() + m[0][2].abs() + m[1][2].abs();
-        if off <= 1e-12 * (m[0][0] + m[1][1] + m[2][2]) {
-            break;
-        }
-        for (p, q) in [(0, 1), (0, 2), (1, 2)] {
-            if m[p][q].abs() < 1e-300 {
-                continue;
-            }
-            let theta = (m[q][q] - m[p][p]) / (2.0 * m[p][q]);
-            let tangent = theta.signum() / (theta.abs() + (theta * theta + 1.0).sqrt());
-            let cosine = 1.0 / (tangent * tangent + 1.0).sqrt();
-            let sine = tangent * cosine;
-            let turned =
-                |first: f64, second: f64| (cosine * first - sine * second, sine * first + cosine * second);
-            for row in &mut m {
-                (row[p], row[q]) = turned(row[p], row[q]);
-            }
-            let rows = [m[p], m[q]];
-            for (k, (first, second)) in rows[0].into_iter().zip(rows[1]).enumerate() {
-                (m[p][k], m[q][k]) = turned(first, second);
-            }
-            (axes[p], axes[q]) = (cosine * axes[p] - sine * axes[q], sine * axes[p] + cosine * axes[q]);
-        }
-    }
-    let mut order = [0, 1, 2];
-    order.sort_by(|&a, &b| m[a][a].total_cmp(&m[b][b]));
-    (order.map(|i| m[i][i]), axes[order[0]].normalize_or(DVec3::Z))
+    let (spreads, axes) = symmetric_eigen(&squares);
+    Some((middle, axes.x_axis, spreads.to_array()))
 }
 
 #[cfg(test)]

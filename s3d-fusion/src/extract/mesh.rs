@@ -4,7 +4,7 @@ use super::samples::Vertex;
 use crate::FusionError;
 use rayon::prelude::*;
 use s3d_geom::glam::Vec3;
-use s3d_geom::{DEFAULT_COLOR, MeshError, MeshParts, TriMesh};
+use s3d_geom::{DEFAULT_COLOR, DisjointSets, MeshError, MeshParts, TriMesh};
 
 /// So many faces are measured at a time.
 const FACES: usize = 1 << 16;
@@ -38,7 +38,7 @@ impl FusedMesh {
         mut faces: Vec<[u32; 3]>,
         least_m2: f64,
     ) -> Result<Self, FusionError> {
-        let mut pieces = Pieces::new(vertices.len());
+        let mut pieces = DisjointSets::new(vertices.len());
         for [a, b, c] in &faces {
             pieces.unite(*a, *b);
             pieces.unite(*a, *c);
@@ -84,40 +84,5 @@ impl FusedMesh {
             Vec::new()
         };
         Ok(Self { positions, faces, colors, dropped_faces })
-    }
-}
-
-/// Sets of vertices that hang together.
-struct Pieces {
-    parent: Vec<u32>,
-}
-
-impl Pieces {
-    fn new(count: usize) -> Self {
-        Self { parent: (0..count as u32).collect() }
-    }
-
-    fn root(&mut self, mut v: u32) -> u32 {
-        while self.parent[v as usize] != v {
-            let above = self.parent[self.parent[v as usize] as usize];
-            self.parent[v as usize] = above;
-            v = above;
-        }
-        v
-    }
-
-    fn unite(&mut self, a: u32, b: u32) {
-        let [a, b] = [a, b].map(|v| self.root(v));
-        self.parent[a.max(b) as usize] = a.min(b);
-    }
-
-    /// Returns the root of each vertex: the lowest vertex of its set.
-    fn roots(self) -> Vec<u32> {
-        let mut parent = self.parent;
-        // A parent comes before its vertex.
-        for v in 0..parent.len() {
-            parent[v] = parent[parent[v] as usize];
-        }
-        parent
     }
 }

@@ -12,7 +12,7 @@ use crate::error::{Error, Result};
 use crate::place::{FOOT_M, HEIGHT_M, LEVEL};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
-use s3d_geom::{NearestFaces, TriMesh};
+use s3d_geom::{DisjointSets, NearestFaces, TriMesh};
 use s3d_render::{Hit, Scene, cast_ray};
 use std::collections::BTreeMap;
 
@@ -154,25 +154,19 @@ impl Ground {
 
     /// Joins walkable feet into components.
     fn join(&mut self, scene: &Scene<'_>) {
-        let mut parents: Vec<u32> = (0..self.feet.len() as u32).collect();
+        let mut sets = DisjointSets::new(self.feet.len());
         for a in 0..self.feet.len() {
             if !self.feet[a].walkable {
                 continue;
             }
             for (side, b) in self.neighbours(a, &HALF) {
                 if self.feet[b].walkable && self.is_step(a, b, side) && self.is_way(scene, a, b) {
-                    let a = root(&mut parents, a as u32);
-                    let b = root(&mut parents, b as u32);
-                    parents[a.max(b) as usize] = a.min(b);
+                    sets.unite(a as u32, b as u32);
                 }
             }
         }
 
-        for foot in 0..self.feet.len() as u32 {
-            let first = root(&mut parents, foot);
-            parents[foot as usize] = first;
-        }
-        self.component = parents;
+        self.component = sets.roots();
     }
 
     /// Decides which components are floors, and which of their feet are places.
@@ -362,16 +356,6 @@ const HALF: [Side; 4] = [(1, 0), (1, 1), (0, 1), (-1, 1)];
 /// Returns whether a tripod has room at a foot.
 fn is_free(foot: &Foot) -> bool {
     foot.walkable && foot.clearance_m >= LEAST_CLEARANCE_M
-}
-
-/// Returns the first foot of a component, and shortens the path to it.
-fn root(parents: &mut [u32], mut foot: u32) -> u32 {
-    while parents[foot as usize] != foot {
-        let next = parents[foot as usize];
-        parents[foot as usize] = parents[next as usize];
-        foot = parents[foot as usize];
-    }
-    foot
 }
 
 /// Returns whether nothing is above a foot up to the height of a location. A surface right above it that does

@@ -9,8 +9,9 @@ use crate::error::{Error, Result};
 use rayon::prelude::*;
 use std::path::Path;
 
-/// The bytes of lines that are parsed together.
+/// The most bytes, and lines, that are parsed together.
 const BLOCK_BYTES: usize = 1 << 20;
+const BLOCK_LINES: usize = 1 << 15;
 /// The fewest lines that a thread parses at a time.
 const FEWEST: usize = 512;
 
@@ -36,6 +37,10 @@ impl LineBlock {
     pub(crate) fn push(&mut self, number: u64, line: &[u8]) {
         self.bytes.extend_from_slice(line);
         self.lines.push((number, self.bytes.len()));
+    }
+
+    fn is_full(&self) -> bool {
+        self.bytes.len() >= BLOCK_BYTES || self.lines.len() >= BLOCK_LINES
     }
 
     /// Returns what each line turned out to be.
@@ -70,7 +75,7 @@ pub(crate) fn parse_lines<'a>(
     let mut fill = |block: &mut LineBlock| {
         block.bytes.clear();
         block.lines.clear();
-        while block.bytes.len() < BLOCK_BYTES {
+        while !block.is_full() {
             if !next(block)? {
                 return Ok(false);
             }
@@ -97,5 +102,71 @@ pub(crate) fn parse_lines<'a>(
         let Some(filled) = filled else { return more.map(|_| true) };
         more = filled;
         std::mem::swap(&mut block, &mut ahead);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cloud::annotations::AnnotationOptions;
+    use crate::cloud::on_fault::OnFault;
+    use crate::cloud::table::rows::{CloudTags, Rows};
+    use crate::cloud::table::words::Separator;
+
+    /// The lines of a file that cannot be read behind its 100,000th line.
+    fn next(number: &mut u64, faulty: u64, block: &mut LineBlock) -> Result<bool> {
+        *number += 1;
+        if *number > 100_000 {
+            return Err(Error::format(Path::new("a.txt"), "the disk is gone"));
+        }
+        let x = if *number == faulty {
+            "x".to_owned()
+        } else {
+            number.to_string()
+        };
+        block.push(*number, format!("{x} 0 0 1").as_bytes());
+        Ok(true)
+    }
+
+    /// Returns the x of all rows, the places where they come from, what was left out, and the error.
+    fn read(faulty: u64, on_fault: OnFault) -> (Vec<f32>, Vec<Place>, Option<String>, String) {
+        let path = Path::new("a.txt");
+        let names = ["x", "y", "z", "class"].map(str::to_owned);
+        let options = AnnotationOptions { on_fault, ..AnnotationOptions::default() };
+        let table = WordTable::new(path, &names, Separator::Blanks, |_| false, (&options).into()).unwrap();
+        let (mut tags, mut x, mut places) = (CloudTags::new(), Vec::new(), Vec::new());
+        let mut sink = |rows: &Rows| {
+            x.extend(rows.positions.iter().map(|p| p.x));
+            Ok(())
+        };
+        let mut reading = Reading::new(path, &options, 0, &mut tags, &mut sink);
+
+        let mut number = 0;
+        let next = |block: &mut LineBlock| next(&mut number, faulty, block);
+        let end = parse_lines(path, &table, ColorRange::Narrow, &mut reading, next, |reading, place, row| {
+            places.push(place);
+            reading.push_line(place.line, row)
+        });
+        reading.flush().unwrap();
+        let first = reading.skipped.first.take().map(|e| e.to_string());
+        (x, places, first, end.unwrap_err().to_string())
+    }
+
+    #[test]
+    fn rows_keep_their_order_over_blocks() {
+        let (x, places, first, end) = read(70_000, OnFault::Skip);
+        let expected = |i: &u64| *i != 70_000;
+        assert!(x.into_iter().eq((1..=100_000).filter(expected).map(|i| i as f32)));
+        let place = |line: u64| Place { index: line - 1, line };
+        assert!(places.into_iter().eq((1..=100_000).filter(expected).map(place)));
+        assert_eq!(first.as_deref(), Some("a.txt, line 70000: the coordinate `x` is no number"));
+        assert_eq!(end, "a.txt: the disk is gone");
+    }
+
+    #[test]
+    fn a_faulty_line_comes_before_an_error_behind_it() {
+        let (x, _, _, end) = read(99_999, OnFault::Stop);
+        assert_eq!(end, "a.txt, line 99999: the coordinate `x` is no number");
+        assert_eq!(x.len(), 99_998);
     }
 }
