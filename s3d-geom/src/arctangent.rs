@@ -1,7 +1,8 @@
 //! The arctangent as a polynomial, for kernels that compute it for several numbers at once.
 
-/// The coefficients of a polynomial p in a², the highest power first: atan(a) is a · p(a²) for 0 ≤ a ≤ 1. They
-/// minimise the largest error, 4e-8, to which single precision adds its own.
+/// The coefficients of a polynomial p in a², the highest power first: atan(a) is a · p(a²) for 0 ≤ a ≤ 1.
+///
+/// They minimise the largest error, 4e-8, to which single precision adds its own.
 ///
 /// ```
 /// let a = 0.5_f32;

@@ -64,7 +64,10 @@ mod tests {
 
     proptest! {
         #[test]
-        fn values_and_vectors_belong_together(numbers in prop::array::uniform6(-1e3..1e3f64), scale in -9..9) {
+        fn values_and_vectors_belong_together(
+            numbers in prop::array::uniform6(-1e3..1e3f64),
+            scale in -9..9,
+        ) {
             let [xx, xy, xz, yy, yz, zz] = numbers.map(|n| n * 10f64.powi(scale));
             let matrix = DMat3::from_cols_array_2d(&[[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]);
             let (values, axes) = symmetric_eigen(&matrix);

@@ -96,12 +96,13 @@ pub enum DecimateError {
     Stopped,
 }
 
-/// Pieces of the surface of about this many old faces are decimated on their own, then what lies between them.
+/// Pieces of about this many old faces are decimated on their own, then what lies between them.
 const FACES_A_PIECE: f64 = 40_000.0;
 
-/// The edge of the cubes of each round, in edges of a piece's cube, and where they begin, in edges of their
-/// own. The first round has the most to do and the later ones a quarter of the faces: pieces of all rounds fit
-/// into a processor's cache, in which they take three quarters of the time. Smaller ones leave more faces.
+/// For each round: the edge of its cubes, in edges of a piece's cube, and where they begin, in own edges.
+///
+/// The later rounds have fewer faces for the same surface. So the pieces of all rounds fit into a
+/// processor's cache, in which they take three quarters of the time. Smaller ones leave more faces.
 const ROUNDS: [(f64, f64); 3] = [(0.5, 0.0), (1.0, 1.0 / 3.0), (1.0, 2.0 / 3.0)];
 
 /// Pieces stop at this multiple of the target, so that the last round chooses among all edges.

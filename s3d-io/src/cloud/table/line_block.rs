@@ -58,8 +58,11 @@ impl LineBlock {
     }
 }
 
-/// Parses lines block by block, on all threads; meanwhile the next block is read. `next` adds the next line to a block, or none, and returns
-/// false at the end. `each` gets the rows in their order. Returns false if a colour may be in a wider range.
+/// Parses lines block by block, on all threads; meanwhile the next block is read. Returns false if a colour
+/// may be in a wider range.
+///
+/// `next` adds the next line to a block, or none, and returns false at the end. `each` gets the rows in their
+/// order.
 ///
 /// # Errors
 /// The first error in the order of the lines: [`Error::Format`] for a line that is no row, unless faults are
