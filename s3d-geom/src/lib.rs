@@ -17,6 +17,10 @@
 //! [`OrientedBox`] is a box that turns with it.
 //! [`Polygon`] and [`triangulate_face`] cut polygons into triangles.
 //!
+//! # Sets and directions
+//!
+//! [`DisjointSets`] tells what hangs together, and [`symmetric_eigen`] in which directions points spread.
+//!
 //! # Example
 //!
 //! ```
