@@ -146,7 +146,9 @@ impl Top {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cast_ray;
     use crate::scene::Scene;
+    use glam::{DVec3, vec3};
 
     #[test]
     fn every_face_is_in_one_leaf_inside_all_boxes_above_it() {
@@ -179,6 +181,33 @@ mod tests {
             }
 
             assert!(met.iter().all(|&m| m) && visited == nodes.len());
+        }
+    }
+
+    #[test]
+    fn a_deep_tree_is_searched() {
+        // Each triangle is a fifth larger than the one before: boxes of neighbours grow, and nest.
+        let size = |k: i32| 1.2_f32.powi(k);
+        let corners = |k: i32| [[1.0, 0.0], [1.2, 0.0], [1.0, 0.2]].map(|[x, y]| vec3(x, y, 0.0) * size(k));
+        let faces = (0..400).map(|k| [0, 1, 2].map(|corner| 3 * k + corner));
+        let positions = (-200..200).flat_map(corners).collect();
+        let mesh = TriMesh::from_faces(positions, faces.collect()).unwrap();
+        let scene = Scene::new(&mesh);
+
+        let nodes = &scene.tree().nodes;
+        let mut deepest = 0;
+        let mut stack = vec![(0, 0)];
+        while let Some((node, depth)) = stack.pop() {
+            deepest = deepest.max(depth);
+            if let Content::Children(first) = nodes[node as usize].content {
+                stack.extend([(first, depth + 1), (first + 1, depth + 1)]);
+            }
+        }
+        assert!(deepest >= 96, "{deepest}");
+        for k in -200..200 {
+            let above = (vec3(1.05, 0.05, 1.0) * size(k)).as_dvec3();
+            let hit = cast_ray(&scene, above, -DVec3::Z).unwrap();
+            assert_eq!(hit.face, (k + 200) as u32);
         }
     }
 }
