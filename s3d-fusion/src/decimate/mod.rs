@@ -99,11 +99,8 @@ pub enum DecimateError {
 /// Pieces of about this many old faces are decimated on their own, then what lies between them.
 const FACES_A_PIECE: f64 = 40_000.0;
 
-/// For each round: the edge of its cubes, in edges of a piece's cube, and where they begin, in own edges.
-///
-/// The later rounds have fewer faces for the same surface. So the pieces of all rounds fit into a
-/// processor's cache, in which they take three quarters of the time. Smaller ones leave more faces.
-const ROUNDS: [(f64, f64); 3] = [(0.5, 0.0), (1.0, 1.0 / 3.0), (1.0, 2.0 / 3.0)];
+/// Where the pieces of each round begin, in pieces.
+const SHIFTS: [f64; 3] = [0.0, 1.0 / 3.0, 2.0 / 3.0];
 
 /// Pieces stop at this multiple of the target, so that the last round chooses among all edges.
 const SLACK: f64 = 3.0;
@@ -180,14 +177,14 @@ fn decimate_in_pieces(
     if faces as f64 > 2.0 * faces_a_piece {
         let cell_m = (whole.area() * faces_a_piece / faces as f64).sqrt().max(1e-3);
         // What lies between the pieces of one round is within those of another, but for single corners.
-        let rounds = if target == 0 { &ROUNDS[..] } else { &ROUNDS[..1] };
-        for (round, (size, shift)) in (0..).zip(rounds) {
+        let rounds = if target == 0 { &SHIFTS[..] } else { &SHIFTS[..1] };
+        for (round, shift) in (0..).zip(rounds) {
             let work = |piece: &mut Patch| {
                 let share = target as f64 * piece.alive as f64 / faces as f64;
                 collapse_edges(piece, &limits((SLACK * share).ceil() as usize));
             };
             let mut go_on = |done| go_on((f64::from(round) + done) / rounds.len() as f64);
-            whole.by_cubes(size * cell_m, *shift, work, &mut go_on)?;
+            whole.by_cubes(cell_m, *shift, work, &mut go_on)?;
         }
         if target == 0 {
             return Some(whole);
