@@ -141,7 +141,8 @@ pub(crate) enum Command {
             "  s3d render scan/rgb.obj --at 13.1,9.65,1.4 --yaw 30 --pitch -10 --fov 75 -o view\n",
             "  s3d render scan/rgb.obj --at 13.1,9.65,1.4 --pano -o pano\n",
             "  s3d render scan/rgb.obj --poses transforms.json -o views\n",
-            "  s3d render scan/rgb.obj --poses trajectory.txt --width 640 --height 480 --fov 60 -o views",
+            "  s3d render scan/rgb.obj --poses trajectory.txt --width 640 --height 480 --fov 60 -o views\n",
+            "  s3d render scan/rgb.obj --trajectory 60 --width 1280 --height 720 --video -o walk",
         )
     )]
     Render(render::RenderArgs),
@@ -281,7 +282,7 @@ impl Command {
             | Self::Compare(_)
             | Self::Eval(_)
             | Self::Detect(_) => true,
-            Self::Render(args) => args.poses.is_some(),
+            Self::Render(args) => args.at.is_none(),
             Self::Info(_) | Self::Stats(_) | Self::Verify(_) => false,
         }
     }

@@ -1,4 +1,5 @@
 //! `s3d render --poses`: the cameras of any list give the same images as an export with these cameras.
+//! `s3d render --trajectory`: a walk is a list of cameras.
 
 use crate::common;
 use common::scan::Scan;
@@ -339,4 +340,65 @@ fn it_tells_how_far_it_is_and_ends_when_asked() {
     let made = render_poses(&mesh, &list, &out, &PosesOptions::default(), &Context::default()).unwrap();
     assert_eq!((made.views, made.blind, made.untracked), (40, 0, 0));
     assert_eq!(images(&out).len(), 5 * 40);
+}
+
+#[test]
+fn a_walk_is_a_list_that_shows_the_same() {
+    let scan = Scan::new();
+    let (mesh, walk, again) = (scan.file("room.obj"), scan.out(), scan.dir.path().join("again"));
+    let walked = |out: &Path, more: &[&str]| {
+        let args = ["render", text(&mesh), "--trajectory", "3", "--rate", "5", "-o", text(out)];
+        s3d_ok(&[&args, more].concat())
+    };
+    walked(&walk, &["--width", "40", "--height", "30", "--threads", "1"]);
+    let first = images(&walk);
+    assert_eq!(first.len(), 5 * 15);
+    assert!(
+        first.contains_key(Path::new("rgb/000000.png")) && first.contains_key(Path::new("depth/000014.png"))
+    );
+
+    // A metre a second, with nothing nearer than a person's width.
+    let poses: Vec<Pose> = posed(&walk).iter().map(|camera| camera.pose).collect();
+    for pair in poses.windows(2) {
+        let step_m = pair[0].location.distance(pair[1].location);
+        assert!(step_m < 0.2 + 1e-9 && (pair[0].location.z - 1.5).abs() < 1e-3, "{pair:?}");
+        assert!((0.19..3.81).contains(&pair[0].location.x) && (0.19..2.81).contains(&pair[0].location.y));
+    }
+
+    // Its list renders to the same images, and another seed walks elsewhere.
+    render(&mesh, &walk, &again, &[]);
+    assert!(images(&again) == first);
+    walked(&again, &["--width", "40", "--height", "30", "--seed", "3", "--overwrite"]);
+    assert!(images(&again) != first);
+
+    walked(&again, &["--pano", "--width", "64", "--overwrite"]);
+    let depth = read_gray16(&again.join("depth/000003.png")).unwrap();
+    assert_eq!((depth.width(), depth.height()), (64, 32));
+}
+
+#[test]
+fn a_walk_or_a_video_that_cannot_be_is_refused_before_anything_is_made() {
+    let scan = Scan::new();
+    let (mesh, out) = (scan.file("room.obj"), scan.out());
+    let fails = |more: &[&str], code, parts: &[&str]| {
+        let args = ["render", text(&mesh), "-o", text(&out)];
+        s3d_fails(&[&args, more].concat(), code, parts);
+        assert!(!out.exists(), "something was written");
+    };
+    fails(&["--trajectory", "0"], 2, &["--trajectory", "above 0"]);
+    fails(&["--trajectory", "1e9"], 2, &["--trajectory: must be 1 to 1000000 images"]);
+    fails(&["--trajectory", "5", "--at", "1,1,1"], 2, &["cannot be used with"]);
+    fails(&["--at", "1,1,1", "--speed", "2"], 2, &["cannot be used with"]);
+    fails(&["--poses", "cameras.csv", "--eye-height", "1"], 2, &["cannot be used with"]);
+    fails(&["--at", "1,1,1", "--video"], 2, &["cannot be used with"]);
+    fails(&["--trajectory", "5", "--eye-height", "9"], 2, &["--eye-height: must be 0.3 to 2.5 metres"]);
+    fails(&["--trajectory", "5", "--eye-height", "2.45"], 1, &["room.obj", "no way of a metre", "2.45"]);
+    fails(&["--trajectory", "5", "--video", "--modalities", "depth"], 2, &["--video", "rgb"]);
+
+    let mut without = std::process::Command::new(env!("CARGO_BIN_EXE_s3d"));
+    without.args(["render", text(&mesh), "--trajectory", "5", "--video", "-o", text(&out)]);
+    let ended = without.env("PATH", scan.dir.path()).output().unwrap();
+    let said = String::from_utf8_lossy(&ended.stderr);
+    assert!(ended.status.code() == Some(2) && said.contains("ffmpeg does not start"), "{said}");
+    assert!(!out.exists());
 }

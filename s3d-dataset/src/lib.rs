@@ -12,7 +12,7 @@
 //! | [`compare`](mod@compare), [`statistics`](mod@statistics) | say how two data sets differ; count one |
 //! | [`pack`](mod@pack), [`profile`](mod@profile), [`xyz`](mod@xyz) | write what trainers and loaders read |
 //! | [`pairs`](mod@pairs) | finds the images that see the same surface |
-//! | [`place`], [`render`](mod@render), [`sample`](mod@sample) | need a mesh alone: places, pictures, points |
+//! | [`place`], [`render`](mod@render), [`sample`](mod@sample) | need a mesh alone: places and walks, pictures, points |
 //! | [`mesh_axes`] | reads a mesh whose up axis and unit are not known |
 //! | [`store`], [`parallel`] | for crates that write results of their own beside a data set |
 //! | [`error`], [`event`], [`summary`] | what a call answers, and what it tells on its way |
@@ -175,11 +175,11 @@ pub use mesh_axes::{MeshAxes, read_mesh};
 pub use options::ExportOptions;
 pub use pack::pack;
 pub use pairs::{PairsOptions, pairs};
-pub use place::place_cameras;
+pub use place::{WalkOptions, place_cameras, walk};
 pub use profile::profile;
 pub use record::data_set::DataSet;
 pub use refine::{RefineOptions, refine};
-pub use render::{render, render_poses};
+pub use render::{render, render_poses, render_walk};
 pub use sample::sample;
 pub use statistics::statistics;
 pub use summary::Summary;

@@ -20,7 +20,7 @@ use tempfile::TempDir;
 
 /// The commands, called in a folder with `scan` (the input), `out` (an export) and `shard_1`, `shard_2` (its
 /// shards). A new command that writes needs a line here.
-const COMMANDS: [&str; 53] = [
+const COMMANDS: [&str; 54] = [
     "export scan/scene.toml -o new SMALL",
     "export scan/scene.toml -o out SMALL --seed 7 --overwrite",
     "export scan/scene.toml -o new SMALL --profile pointcept,open3d-ml",
@@ -66,6 +66,7 @@ const COMMANDS: [&str; 53] = [
     "render scan/room.obj --at 2,1.2,1.5 --size 200 -o old --pano --overwrite",
     "render scan/room.obj --poses scan/cameras.csv --width 120 --height 90 --fov 70 -o new/views",
     "render scan/room.obj --poses scan/cameras.csv --width 120 --height 90 --fov 70 -o views --overwrite",
+    "render scan/room.obj --trajectory 4 --rate 10 --width 80 -o walk",
     "profile out --to mmdet3d",
     "report out --pano-width 32 --thumbs 16",
     "report out --single -o new.html --poster new.png --pano-width 32 --thumbs 16",

@@ -70,7 +70,7 @@ pub(super) fn uuid(text: &str) -> Result<String, String> {
 }
 
 /// Parses a switch: smooth normals if it is set, flat ones if not.
-pub(super) fn smooth_normals() -> MapValueParser<BoolValueParser, fn(bool) -> Normals> {
+pub(crate) fn smooth_normals() -> MapValueParser<BoolValueParser, fn(bool) -> Normals> {
     let normals: fn(bool) -> Normals = |smooth| if smooth { Normals::Smooth } else { Normals::Flat };
     BoolValueParser::new().map(normals)
 }

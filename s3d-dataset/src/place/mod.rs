@@ -2,6 +2,9 @@
 //! evenly, away from walls and things. Without labels they stand in the free space.
 
 pub(crate) mod free_space;
+mod walk;
+
+pub use walk::{WalkOptions, walk};
 
 use crate::context::Context;
 use crate::error::{InputError, Result};

@@ -1,8 +1,9 @@
-//! Renders views of a mesh without annotations: one view, or a view of each camera of a list.
+//! Renders views of a mesh without annotations: one view, a view of each camera of a list, or a walk.
 
 mod frame_names;
 mod poses;
+mod video;
 mod view;
 
-pub use poses::{PosesOptions, RenderedPoses, render_poses};
+pub use poses::{PosesOptions, RenderedPoses, render_poses, render_walk};
 pub use view::{RenderOptions, render};

@@ -1,21 +1,27 @@
-//! Renders the views of a list of cameras. The mesh is loaded once, and all threads share the cameras.
+//! Renders the views of many cameras: of a list, or of a walk through the mesh. The mesh is loaded once, and
+//! all threads share the cameras.
 
 use super::frame_names::frame_names;
+use super::video;
 use super::view::{RenderOptions, channels, curvatures, face_image, faces_fit, images};
 use crate::condition::Condition;
 use crate::context::Context;
-use crate::error::{Error, Overwriting, Result, UsageError};
+use crate::error::{Error, InputError, Overwriting, Result, UsageError};
 use crate::export::input::photographs::camera_error;
-use crate::export::modality::{Image, ImageBuffers};
+use crate::export::modality::ImageBuffers;
 use crate::mesh_axes::read_mesh;
 use crate::parallel::for_each_in_order;
+use crate::place::{WalkOptions, walk};
 use crate::store::parent_of;
 use crate::store::staging::Staging;
 use crate::useful::{judge_of, poses_findings};
 use glam::{DAffine3, DVec3};
 use s3d_geom::{Aabb, Camera};
 use s3d_io::Error as FileError;
-use s3d_io::camera::{GivenIntrinsics, IntrinsicsError, PosedCamera, PosedCameras, read_posed_cameras};
+use s3d_io::camera::{
+    GivenIntrinsics, IntrinsicsError, Optics, PosedCamera, PosedCameras, read_posed_cameras,
+};
+use s3d_io::dataset::Domain;
 use s3d_io::fs::{create_dir, read_json, write_bytes, write_json};
 use s3d_io::mesh::{MeshOrigin, UpAxis};
 use s3d_io::package::NerfstudioFrame;
@@ -32,6 +38,9 @@ const CAMERAS: &str = "transforms.json";
 
 const GENERATOR: &str = "s3d render";
 
+/// The horizontal angle of view of a walk, degrees.
+const FOV_DEG: f64 = 75.0;
+
 /// The largest width or height of an image, pixels.
 const MAX_SIDE: u32 = 32_768;
 
@@ -46,16 +55,25 @@ pub struct PosesOptions {
     pub intrinsics: GivenIntrinsics,
     /// Conditions that need not be met. Only [`Condition::Coverage`] is used.
     pub allow: Vec<Condition>,
+    /// The images a second of a video of the colour images, `rgb.mp4`. It is made by ffmpeg, which must be
+    /// installed. `None`: no video.
+    pub video_rate: Option<f64>,
 }
 
 impl Default for PosesOptions {
     fn default() -> Self {
         let intrinsics = GivenIntrinsics::default();
-        Self { render: RenderOptions::default(), poses_up: UpAxis::Z, intrinsics, allow: Vec::new() }
+        Self {
+            render: RenderOptions::default(),
+            poses_up: UpAxis::Z,
+            intrinsics,
+            allow: Vec::new(),
+            video_rate: None,
+        }
     }
 }
 
-/// The counts that [`render_poses`] returns.
+/// The counts that [`render_poses`] and [`render_walk`] return.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct RenderedPoses {
@@ -110,13 +128,7 @@ pub fn render_poses(
     options: &PosesOptions,
     ctx: &Context,
 ) -> Result<RenderedPoses> {
-    let parent = parent_of(output);
-    let folder_name = Path::new(output.file_name().unwrap_or_default());
-    let overwrite = options.render.overwrite;
-    if !Staging::is_left(&parent, folder_name) {
-        check_free(output, overwrite)?;
-    }
-
+    check_output(output, options)?;
     let world_from_poses = DAffine3::from_mat3(options.poses_up.rotation());
     let PosedCameras { cameras, untracked, .. } = read_posed_cameras(poses, &world_from_poses)?;
     let mut frames = frames(poses, &cameras, &options.intrinsics)?;
@@ -127,7 +139,73 @@ pub fn render_poses(
     frames
         .iter_mut()
         .for_each(|frame| frame.camera.pose.location -= file.offset_m);
-    let world_offset_m = (file.offset_m != DVec3::ZERO).then(|| file.offset_m.to_array());
+    let scene = Scene::new(&file.mesh);
+    let rendered = write_views(output, &scene, file.offset_m, &frames, options, ctx)?;
+    Ok(RenderedPoses { untracked: untracked as u64, ..rendered })
+}
+
+/// Renders the views of somebody who walks through a mesh (see [`walk`](crate::walk)), as [`render_poses`]
+/// does those of a list. Images are named by their number, `000000` first. Sizes that the options do not give
+/// are 1080 pixels, or those of a panorama 4096 × 2048; the angle of view is 75°.
+///
+/// # Errors
+/// [`Error::Usage`] if the folder is not empty and may not be replaced, or a number is out of range;
+/// [`Error::File`]; [`Error::Input`] if there is no way of a metre; [`Error::Cancelled`].
+pub fn render_walk(
+    mesh: &Path,
+    way: &WalkOptions,
+    output: &Path,
+    options: &PosesOptions,
+    ctx: &Context,
+) -> Result<RenderedPoses> {
+    check_output(output, options)?;
+    let file = read_mesh(mesh, options.render.axes, MeshOrigin::Near, ctx)?;
+    let scene = Scene::new(&file.mesh);
+    let poses = walk(&scene, way, ctx).map_err(|e| match e {
+        Error::Input(InputError::Unfit { why, .. }) => InputError::Unfit { path: mesh.into(), why }.into(),
+        other => other,
+    })?;
+    let cameras: Vec<PosedCamera> = (0..)
+        .zip(poses)
+        .map(|(number, pose)| PosedCamera::new(format!("{number:06}"), pose))
+        .collect();
+
+    let GivenIntrinsics { width, height, optics } = options.intrinsics;
+    let is_panorama = optics == Some(Optics::Equirectangular);
+    let width = width.unwrap_or(if is_panorama { 4096 } else { 1080 });
+    let given = GivenIntrinsics {
+        width: Some(width),
+        height: height.or(Some(if is_panorama { width / 2 } else { width })),
+        optics: optics.or(Some(Optics::AngleOfView { fov_rad: FOV_DEG.to_radians() })),
+    };
+    let frames = frames(mesh, &cameras, &given)?;
+    write_views(output, &scene, file.offset_m, &frames, options, ctx)
+}
+
+/// Checks before anything is read that the result can be written.
+fn check_output(output: &Path, options: &PosesOptions) -> Result<()> {
+    if let Some(rate) = options.video_rate {
+        video::check(rate, &options.render.modalities)?;
+    }
+    let folder_name = Path::new(output.file_name().unwrap_or_default());
+    if Staging::is_left(&parent_of(output), folder_name) {
+        return Ok(());
+    }
+    check_free(output, options.render.overwrite)
+}
+
+/// Writes the folder of all views. `offset_m` was subtracted from the mesh and the cameras.
+fn write_views(
+    output: &Path,
+    scene: &Scene<'_>,
+    offset_m: DVec3,
+    frames: &[Frame<'_>],
+    options: &PosesOptions,
+    ctx: &Context,
+) -> Result<RenderedPoses> {
+    let parent = parent_of(output);
+    let folder_name = Path::new(output.file_name().unwrap_or_default());
+    let world_offset_m = (offset_m != DVec3::ZERO).then(|| offset_m.to_array());
     if let Some(offset_m) = world_offset_m {
         ctx.info(format_args!(
             "the mesh lies far from the origin: {offset_m:?} is subtracted from its coordinates and the \
@@ -137,15 +215,15 @@ pub fn render_poses(
 
     create_dir(&parent)?;
     let staging = Staging::begin(ctx, &parent, folder_name)?;
-    check_free(output, overwrite || staging.was_placing())?;
+    check_free(output, options.render.overwrite || staging.was_placing())?;
     let started = Instant::now();
-    let blind = write_images(ctx, &file.mesh, &frames, staging.path(), &options.render)?;
+    let blind = write_images(ctx, scene, frames, staging.path(), &options.render)?;
     let seconds = started.elapsed().as_secs_f64();
 
     let places = frames.iter().map(|frame| frame.camera.pose.location.as_vec3());
     let places = Aabb::from_points(places);
     let count = frames.len() as u64;
-    let findings = poses_findings(blind, count, &places, &file.mesh.aabb(), "up and poses_up");
+    let findings = poses_findings(blind, count, &places, &scene.mesh().aabb(), "up and poses_up");
     judge_of(("the views", "write them"), ctx, &findings, &options.allow)?;
 
     let is_panorama = frames.first().is_some_and(|frame| frame.camera.is_panorama());
@@ -163,9 +241,15 @@ pub fn render_poses(
     };
 
     write_json(&staging.path().join(CAMERAS), &transforms)?;
+    if let Some(rate) = options.video_rate {
+        let pictures = frames
+            .iter()
+            .map(|frame| path_of(staging.path(), Domain::Rgb, &frame.stem));
+        video::write(ctx, pictures, rate, staging.path())?;
+    }
     staging.place_folder(output, is_ours(output))?;
     ctx.info(format_args!("{}: {} views in {seconds:.1} s", output.display(), frames.len()));
-    Ok(RenderedPoses { views: frames.len() as u64, blind, untracked: untracked as u64 })
+    Ok(RenderedPoses { views: frames.len() as u64, blind, untracked: 0 })
 }
 
 /// The views of a list's cameras.
@@ -231,31 +315,29 @@ fn tell_of_list(ctx: &Context, cameras: &[PosedCamera], untracked: usize) {
 /// Writes the images of all views into folders by kind. Returns the number of views that see nothing.
 fn write_images(
     ctx: &Context,
-    mesh: &s3d_geom::TriMesh,
+    scene: &Scene<'_>,
     frames: &[Frame<'_>],
     folder: &Path,
     options: &RenderOptions,
 ) -> Result<u64> {
-    let folder_of = |image: Image| folder.join(image.domain().folder());
-    let path_of =
-        |image: Image, stem: &str| folder_of(image).join(format!("{stem}.{}", image.domain().extension()));
+    let mesh = scene.mesh();
     let faces = faces_fit(ctx, mesh.faces().len()).then(|| folder.join("faces"));
     let images = images(options)?;
-    let folders: Vec<PathBuf> = images.iter().copied().map(folder_of).chain(faces.clone()).collect();
+    let of_images = images.iter().map(|image| folder.join(image.domain().folder()));
+    let folders: Vec<PathBuf> = of_images.chain(faces.clone()).collect();
     folders.iter().try_for_each(|folder| create_dir(folder))?;
 
-    let scene = Scene::new(mesh);
     let textures = MipMaps::new(mesh);
     let curvatures = curvatures(mesh, options);
-    let channels = channels(&scene, &textures, &curvatures, options);
+    let channels = channels(scene, &textures, &curvatures, options);
     let progress = ctx.progress("rendering", "views", frames.len() as u64);
     let blind = AtomicU64::new(0);
-    let memory = || (Caster::new(&scene), Hits::default(), ImageBuffers::default());
+    let memory = || (Caster::new(scene), Hits::default(), ImageBuffers::default());
     for_each_in_order(ctx, frames, memory, |(caster, hits, buffers), frame| {
         let Frame { stem, camera, name } = frame;
         caster.cast_into(camera, 1, hits);
         channels.encode(&images, hits, camera, buffers, |image, file| {
-            write_bytes(&path_of(image, stem), &file).map(drop)
+            write_bytes(&path_of(folder, image.domain(), stem), &file).map(drop)
         })?;
         if let Some(faces) = &faces {
             write_bytes(&faces.join(format!("{stem}.png")), &face_image(hits, options.compression))?;
@@ -268,6 +350,13 @@ fn write_images(
         Ok(())
     })?;
     Ok(blind.into_inner())
+}
+
+/// The file of an image in a folder of views.
+fn path_of(folder: &Path, domain: Domain, stem: &str) -> PathBuf {
+    folder
+        .join(domain.folder())
+        .join(format!("{stem}.{}", domain.extension()))
 }
 
 /// Refuses a folder that holds anything, unless this command wrote it and may replace it.

@@ -5,6 +5,8 @@ use crate::error::{Result, UsageError};
 use crate::export::modality::{Channels, Image, ImageBuffers};
 use crate::memory::check_memory;
 use crate::mesh_axes::{MeshAxes, read_mesh};
+#[cfg(feature = "clap")]
+use crate::options::words;
 use crate::store::refuse_existing;
 use crate::store::staging::Staging;
 use glam::DVec3;
@@ -42,21 +44,35 @@ struct View {
     world_offset_m: Option<[f64; 3]>,
 }
 
-/// The options of [`render`].
+/// The images of [`render()`] that are made unless others are asked for.
+const USUAL: [Domain; 4] = [Domain::Rgb, Domain::Depth, Domain::Normal, Domain::GlobalXyz];
+
+/// The options of [`render`]. With the feature `clap` it is a group of arguments of a command line.
 #[derive(Clone, Debug)]
+#[cfg_attr(feature = "clap", derive(clap::Args))]
 pub struct RenderOptions {
     /// What is known of the mesh's file.
+    #[cfg_attr(feature = "clap", arg(skip))]
     pub axes: MeshAxes,
-    /// Normals of faces, or interpolated from the mesh's own if it has any.
+    /// Interpolate the mesh's own normals where it has some, instead of using the normals of the faces.
+    #[cfg_attr(feature = "clap", arg(long = "smooth-normals", action = clap::ArgAction::SetTrue,
+        value_parser = words::smooth_normals()))]
     pub normals: Normals,
-    /// See [`ExportOptions::rgb_samples`](crate::ExportOptions::rgb_samples).
+    /// Take N colour samples in a pixel where surfaces end or turn. All other images keep one sample.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "N", default_value_t = 1,
+        value_parser = clap::value_parser!(u32).range(1..=64)))]
     pub rgb_samples: u32,
-    /// The images to write. Images of labels cannot be made of a mesh alone, and the camera has a file of its
-    /// own.
+    /// The images to write: any of `s3d export` that need no labels.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "LIST", value_delimiter = ',',
+        default_values_t = USUAL, value_parser = words::parsed::<Domain>))]
     pub modalities: Vec<Domain>,
-    /// The time that compressing image files may take.
+    /// Compression of the image files: fast, balanced (about as small as files by libpng and OpenEXR) or
+    /// small (slowest). The pixels are the same.
+    #[cfg_attr(feature = "clap", arg(long, value_name = "fast|balanced|small", default_value_t,
+        value_parser = words::parsed::<Compression>))]
     pub compression: Compression,
     /// Replace existing images.
+    #[cfg_attr(feature = "clap", arg(long))]
     pub overwrite: bool,
 }
 
@@ -66,7 +82,7 @@ impl Default for RenderOptions {
             axes: MeshAxes::default(),
             normals: Normals::Flat,
             rgb_samples: 1,
-            modalities: vec![Domain::Rgb, Domain::Depth, Domain::Normal, Domain::GlobalXyz],
+            modalities: USUAL.to_vec(),
             compression: Compression::default(),
             overwrite: false,
         }

@@ -22,7 +22,8 @@ use s3d_geom::{NearestFaces, Pose, TriMesh};
 use s3d_io::camera::{ScanLocation, uuid_from_name};
 use s3d_render::{Scene, cast_ray};
 use s3d_sample::poisson_disk_where;
-use standing::{Facing, Ground, Standpoint};
+use standing::Facing;
+pub(super) use standing::{BODY_M, CLEARANCE_M, Ground, HIP_M, Standpoint};
 use visibility::{Enclosure, Surface};
 
 /// The edge of the squares with one candidate each, metres. Squares grow if there would be more than
@@ -99,13 +100,15 @@ pub(crate) fn place_in_free_space(
 
     // Find the places, and what can be seen from them.
     let search = Search { ctx, scene, nearest, cell_m, most };
-    let interior = search.run(Facing::Fronts)?;
-    if interior.standpoints.is_empty() {
-        return Err(InputError::UnfitArea { area, why: search.explain(&interior)? }.into());
-    }
+    let Interior { standpoints, floor, .. } = match search.run(Facing::Fronts)? {
+        none if none.standpoints.is_empty() => {
+            return Err(InputError::UnfitArea { area, why: search.explain(&none)? }.into());
+        }
+        some => some,
+    };
 
     let surface = Surface::sample(mesh, options.seed);
-    let eyes: Vec<DVec3> = interior.standpoints.iter().map(Standpoint::eye).collect();
+    let eyes: Vec<DVec3> = standpoints.iter().map(Standpoint::eye).collect();
     let lists = if eyes.len() <= MOST_CANDIDATES {
         surface.seen_from(ctx, scene, &eyes)?
     } else {
@@ -117,11 +120,11 @@ pub(crate) fn place_in_free_space(
 
     let (chosen, cover) = match options.distance_m {
         None => {
-            let weights: Vec<u64> = interior.standpoints.iter().map(Standpoint::weight).collect();
+            let weights: Vec<u64> = standpoints.iter().map(Standpoint::weight).collect();
             cover::greedy(&lists, &weights, surface.len(), options.share)
         }
         Some(distance_m) => {
-            let chosen = pattern(scene, &interior.standpoints, &eyes, distance_m, options.seed, area);
+            let chosen = pattern(scene, &standpoints, &eyes, distance_m, options.seed, area);
             let at: Vec<DVec3> = chosen.iter().map(|&i| eyes[i]).collect();
             let seen = surface.seen_from(ctx, scene, &at)?;
             let cover = Cover::of(&seen, lists.iter().chain(&seen), surface.len());
@@ -165,7 +168,21 @@ pub(crate) fn place_in_free_space(
         let name = format!("s3d free space {area} {number} {} {} {} {}", options.seed, eye.x, eye.y, eye.z);
         locations.push(ScanLocation { uuid: uuid_from_name(&name), pose: Pose::level(eye, 0.0), line: 0 });
     }
-    Ok(FreeSpace { locations, seen, floor: interior.floor, warnings })
+    Ok(FreeSpace { locations, seen, floor, warnings })
+}
+
+/// Finds where a person can stand and walk inside, with a standpoint each half metre.
+///
+/// # Errors
+/// [`Error::Input`](crate::Error::Input) if that is nowhere; the error says what was found and what may be
+/// wrong. [`Error::Cancelled`](crate::Error::Cancelled).
+pub(super) fn interior(ctx: &Context, scene: &Scene<'_>, nearest: &NearestFaces<'_>) -> Result<Interior> {
+    let search = Search { ctx, scene, nearest, cell_m: CELL_M, most: MOST_CANDIDATES };
+    let interior = search.run(Facing::Fronts)?;
+    if interior.standpoints.is_empty() {
+        return Err(InputError::Unfit { path: "the mesh".into(), why: search.explain(&interior)? }.into());
+    }
+    Ok(interior)
 }
 
 /// Chooses places on a Poisson-disk pattern: wide ones, and narrow ones where no wide one is near. Rooms on
@@ -201,7 +218,7 @@ const HINTS: &str =
     "is `up` the axis that points up, is `units` right, and do faces have their fronts inside?";
 
 /// Returns whether nothing is between two eyes.
-fn sees(scene: &Scene<'_>, from: DVec3, to: DVec3) -> bool {
+pub(super) fn sees(scene: &Scene<'_>, from: DVec3, to: DVec3) -> bool {
     cast_ray(scene, from, to - from).is_none_or(|hit| hit.t >= 1.0)
 }
 
@@ -215,8 +232,9 @@ struct Search<'a> {
 }
 
 /// The standpoints inside, and the floor on the way to them.
-struct Interior {
-    standpoints: Vec<Standpoint>,
+pub(super) struct Interior {
+    pub(super) ground: Ground,
+    pub(super) standpoints: Vec<Standpoint>,
     floor: FloorFound,
     /// The mean enclosure of the standpoints that are not inside.
     around: Enclosure,
@@ -245,7 +263,7 @@ impl Search<'_> {
                 outside.push(around);
             }
         }
-        Ok(Interior { standpoints, floor, around: Enclosure::mean(&outside) })
+        Ok(Interior { ground, standpoints, floor, around: Enclosure::mean(&outside) })
     }
 
     /// Returns why no place was found.

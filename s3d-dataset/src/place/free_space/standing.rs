@@ -17,15 +17,15 @@ use s3d_render::{Hit, Scene, cast_ray};
 use std::collections::BTreeMap;
 
 /// Half the width of a person, metres. This much must be free around at 1 m and at 1.5 m.
-const BODY_M: f32 = 0.2;
+pub(in crate::place) const BODY_M: f32 = 0.2;
 
 /// The heights above a foot at which the free space around is measured, metres: at the knees, the hips, and
 /// the location.
 const KNEE_M: f64 = 0.6;
-const HIP_M: f64 = 1.0;
+pub(in crate::place) const HIP_M: f64 = 1.0;
 
 /// The free space that a location wants around itself, metres. A place with less has less weight.
-const CLEARANCE_M: f32 = 0.5;
+pub(in crate::place) const CLEARANCE_M: f32 = 0.5;
 
 /// The free space that a place needs around itself, metres.
 const LEAST_CLEARANCE_M: f32 = 0.1;
@@ -73,12 +73,14 @@ impl Facing {
 
 /// A place where a tripod with the scanner can stand.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Standpoint {
+pub(in crate::place) struct Standpoint {
+    /// The number of the foot of [`Ground`].
+    pub(in crate::place) index: usize,
     pub(super) foot: DVec3,
     /// The free space around, metres, at most [`CLEARANCE_M`].
     clearance_m: f32,
     /// The walkable floor that this place represents, in m².
-    pub(super) stands_for_m2: f64,
+    pub(in crate::place) stands_for_m2: f64,
 }
 
 impl Standpoint {
@@ -88,7 +90,7 @@ impl Standpoint {
     }
 
     /// Returns whether there is as much room around as a location wants.
-    pub(super) fn is_wide(&self) -> bool {
+    pub(in crate::place) fn is_wide(&self) -> bool {
         self.clearance_m >= CLEARANCE_M
     }
 
@@ -100,7 +102,7 @@ impl Standpoint {
 }
 
 /// All feet, by column and height.
-pub(super) struct Ground {
+pub(in crate::place) struct Ground {
     grid: Grid,
     feet: Vec<Foot>,
     /// The first foot of each foot's component.
@@ -265,6 +267,7 @@ impl Ground {
                 return found
                     .into_iter()
                     .map(|(a, stands_for_m2)| Standpoint {
+                        index: a,
                         foot: self.grid.at(&self.feet[a]),
                         clearance_m: self.feet[a].clearance_m,
                         stands_for_m2,
@@ -274,6 +277,39 @@ impl Ground {
 
             cell_m *= (found.len() as f64 / most as f64).sqrt().max(1.1);
         }
+    }
+
+    /// Returns the number of feet.
+    pub(in crate::place) fn len(&self) -> usize {
+        self.feet.len()
+    }
+
+    /// Returns the position of a foot.
+    pub(in crate::place) fn foot(&self, a: usize) -> DVec3 {
+        self.grid.at(&self.feet[a])
+    }
+
+    /// Returns whether a person fits on a foot, which is floor.
+    pub(in crate::place) fn is_walkable(&self, a: usize) -> bool {
+        self.feet[a].walkable
+    }
+
+    /// Returns the free space around a walkable foot, metres, at most that of [`Standpoint::is_wide`].
+    pub(in crate::place) fn clearance_m(&self, a: usize) -> f32 {
+        self.feet[a].clearance_m
+    }
+
+    /// Returns the walkable feet to which a person can step, and how far they are, metres.
+    pub(in crate::place) fn steps<'a>(
+        &'a self,
+        scene: &'a Scene<'_>,
+        a: usize,
+    ) -> impl Iterator<Item = (usize, f64)> + 'a {
+        self.neighbours(a, &SIDES)
+            .filter(move |&(side, b)| {
+                self.feet[b].walkable && self.is_step(a, b, side) && self.is_way(scene, a, b)
+            })
+            .map(move |(_, b)| (b, self.foot(a).distance(self.foot(b))))
     }
 
     /// Returns the squared distance of a foot from the middle of its square, in squares.
