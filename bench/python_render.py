@@ -1,8 +1,8 @@
 """Views in Python: `s3d_py.Scene.render` and Open3D's `RaycastingScene`, in turns, in one process.
 
-    python3 bench/python_render.py OFFICE/scene.obj --up z --at X,Y,Z [--rounds N] [--size PX]
+    python3 bench/python_render.py OFFICE/scene.obj --up z --at X,Y,Z [--rounds N] [--size PX] [--views N]
 
-Needs s3d_py of a release build, and open3d for the second half. Twelve views of a place, each of SIZE² pixels and 75°; seconds are
+Needs s3d_py of a release build, and open3d for the second half. Views of a place, each of SIZE² pixels and 75°; seconds are
 processor time of the process, so that other work on the machine disturbs little. Open3D gets its rays ready-made, on one thread,
 and makes depth and normals alone.
 """
@@ -28,17 +28,24 @@ def main():
     parser.add_argument("--at", required=True, type=lambda text: np.array([float(x) for x in text.split(",")]))
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--size", type=int, default=1080)
+    parser.add_argument("--views", type=int, default=12)
     args = parser.parse_args()
     mesh = s3d.read_mesh(args.mesh, up=args.up)
     scene = s3d.Scene(mesh)
     size, K = (args.size, args.size), s3d.intrinsics((args.size, args.size), 75)
-    angles = 2 * np.pi * np.arange(12) / 12
+    angles = 2 * np.pi * np.arange(args.views) / args.views
     poses = [s3d.look_at(args.at, args.at + [np.cos(a), np.sin(a), -0.2]) for a in angles]
 
     def render(*modalities):
         return lambda: [scene.render(K, pose, size, modalities=modalities) for pose in poses]
 
-    ways = {" + ".join(m): render(*m) for m in (("rgb", "depth", "normal"), ("depth", "normal"), ("depth",))}
+    kinds = (("rgb", "depth", "normal"), ("depth", "normal"), ("depth",), ("rgb", "depth", "face"))
+    ways = {" + ".join(m): render(*m) for m in kinds}
+    for m in kinds[2:]:
+        ways[f"stack of {' + '.join(m)}"] = lambda m=m: scene.render_stack(poses, K, size, modalities=m, threads=1)
+    ways["the same, textures trilinear"] = lambda: scene.render_stack(
+        poses, K, size, modalities=kinds[3], texture_samples=1, threads=1
+    )
     try:
         import open3d as o3d
     except ImportError:
@@ -59,7 +66,7 @@ def main():
             taken[name].append(seconds(way) / len(poses))
     for name, times in taken.items():
         median = np.median(times)
-        print(f"{name:24} {1e3 * median:7.1f} ms a view ({1e3 * min(times):.1f} to {1e3 * max(times):.1f}), {1 / median:6.1f} a second")
+        print(f"{name:30} {1e3 * median:7.2f} ms a view ({1e3 * min(times):.2f} to {1e3 * max(times):.2f}), {1 / median:6.1f} a second")
 
 
 if __name__ == "__main__":

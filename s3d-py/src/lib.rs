@@ -18,6 +18,7 @@ mod points;
 mod poses;
 mod scene;
 mod segments;
+mod stack;
 mod work;
 
 /// `s3d_py._native`.

@@ -3,19 +3,22 @@
 use crate::arrays;
 use crate::error::{exception, usage};
 use crate::mesh::Mesh;
+use crate::stack;
 use crate::work::{detached, watched};
+use bytemuck::cast_slice;
+use half::slice::HalfFloatSliceExt;
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use s3d_dataset::place::PlaceOptions;
-use s3d_dataset::{check_memory, place_cameras};
+use s3d_dataset::{WalkOptions, check_memory, place_cameras, walk};
 use s3d_geom::glam::DVec3;
 use s3d_geom::{Camera, NO_INDEX, Nearest, NearestFaces, NormalAxes, Pose, Raster};
 use s3d_io::image::{Compression, Content, encode_rgb8};
 use s3d_io::mesh::MeshFile;
 use s3d_render::{
     Hits, MipMaps, NO_FACE, Normals, TextureFilter, are_inside, are_rays_blocked, cast, cast_rays,
-    correspondences, count_hits, depth_image, normal_image, normal_vectors, rgb_image, sample_edges,
+    correspondences, count_hits, depth_image, normal_image, normal_vectors, rgb_image_with, sample_edges,
     xyz_image, xyz_image_half,
 };
 use self_cell::self_cell;
@@ -50,17 +53,18 @@ pub(crate) struct Scene {
     nearest: OnceLock<MeshAndNearest>,
 }
 
-/// The request for a view: modalities, smooth normals, colour samples of a pixel, and whether pixels are as
-/// the files of a data set store them, instead of numbers in metres.
+/// The request for a view: modalities, smooth normals, colour samples of a pixel at an edge, the most samples
+/// of a texture in a pixel, and whether pixels are as the files of a data set store them, instead of numbers
+/// in metres.
 #[derive(FromPyObject)]
-struct Request(Vec<String>, bool, u32, bool);
+pub(crate) struct Request(Vec<String>, bool, u32, u32, bool);
 
 /// A camera: K, or none for a panorama, the pose, and width and height.
 #[derive(FromPyObject)]
 struct View(Option<[[f64; 3]; 3]>, [[f64; 4]; 4], [u32; 2]);
 
 /// An image of a view.
-enum Modality {
+pub(crate) enum Modality {
     Rgb(Raster<[u8; 3]>),
     Depth(Raster<f32>),
     StoredDepth(Raster<u16>),
@@ -93,28 +97,17 @@ impl Scene {
         request: Request,
     ) -> PyResult<Bound<'py, PyDict>> {
         let camera = camera(k, world_from_camera, size)?;
-        let Request(modalities, _, rgb_samples, stored) = &request;
-        if let Some(word) = modalities.iter().find(|word| !MODALITIES.contains(&word.as_str())) {
-            return Err(usage(format!("modalities: {word:?} is none of {}", MODALITIES.join(", "))));
-        }
-        if !(1..=64).contains(rgb_samples) {
-            return Err(usage(format!("rgb_samples={rgb_samples}: must be from 1 to 64")));
-        }
-
+        let modalities = request.modalities()?;
         let pixels = f64::from(camera.width) * f64::from(camera.height);
         let what = format!("images of {} × {} pixels", camera.width, camera.height);
         check_memory(&what, pixels * (HIT_BYTES + modalities.iter().map(|word| bytes_of(word)).sum::<f64>()))
             .map_err(|e| exception(&e))?;
 
         let images = py.detach(|| {
+            let mut made = Vec::new();
             let mut hits = cast(self.tree(), &camera);
-            // Depth and faces take the hits themselves, so they are made last.
-            let mut words: Vec<&str> = modalities.iter().map(String::as_str).collect();
-            words.sort_by_key(|word| (*word == "depth" && !*stored) || *word == "face");
-            let made = words
-                .iter()
-                .map(|word| (*word, self.draw(word, &mut hits, &camera, &request)));
-            made.collect::<Vec<_>>()
+            self.draw_all(&mut hits, &camera, &request, |word, image| made.push((word.to_owned(), image)));
+            made
         });
 
         let dict = PyDict::new(py);
@@ -122,6 +115,25 @@ impl Scene {
             dict.set_item(word, array(py, image)?)?;
         }
         Ok(dict)
+    }
+
+    /// Returns the images of pinhole cameras of one size by name, each in one array: one K for all or one for
+    /// each, and the poses.
+    fn render_stack<'py>(
+        &self,
+        py: Python<'py>,
+        ks: Vec<[[f64; 3]; 3]>,
+        poses: Vec<[[f64; 4]; 4]>,
+        size: [u32; 2],
+        request: Request,
+        threads: Option<usize>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let ks = ks.iter().cycle().take(poses.len());
+        let cameras = ks
+            .zip(&poses)
+            .map(|(k, pose)| camera(Some(*k), *pose, size))
+            .collect::<PyResult<Vec<_>>>()?;
+        stack::render_stack(py, self, &cameras, size, &request, threads)
     }
 
     /// Returns the first hit of each ray: t, the multiple of the direction (NaN for no hit), and the face
@@ -256,6 +268,24 @@ impl Scene {
             .map(|place| (place.uuid, arrays::world_from_opencv(&place.pose)))
             .collect())
     }
+
+    /// Walks through the mesh, and returns the matrix camera → world of each pose.
+    #[allow(clippy::too_many_arguments)]
+    fn walk(
+        &self,
+        py: Python<'_>,
+        frames: usize,
+        speed_m_s: f64,
+        rate: f64,
+        height_m: f64,
+        seed: u64,
+        threads: Option<usize>,
+        sink: Py<PyAny>,
+    ) -> PyResult<Vec<[[f64; 4]; 4]>> {
+        let options = WalkOptions { frames, rate, speed_m_s, height_m, seed };
+        let poses = watched(py, threads, &sink, |ctx| walk(self.tree(), &options, ctx))?;
+        Ok(poses.iter().map(arrays::world_from_opencv).collect())
+    }
 }
 
 const MODALITIES: [&str; 5] = ["rgb", "depth", "normal", "xyz", "face"];
@@ -302,7 +332,7 @@ fn few_or_many<T: Send>(
 const HIT_BYTES: f64 = 8.0;
 
 /// The bytes of a pixel of an image, at most.
-fn bytes_of(modality: &str) -> f64 {
+pub(crate) fn bytes_of(modality: &str) -> f64 {
     match modality {
         "rgb" => 3.0,
         "depth" | "face" => 4.0,
@@ -310,8 +340,22 @@ fn bytes_of(modality: &str) -> f64 {
     }
 }
 
+impl Request {
+    /// Returns the modalities, if all of them are known.
+    pub(crate) fn modalities(&self) -> PyResult<&[String]> {
+        let Self(modalities, _, rgb_samples, ..) = self;
+        if let Some(word) = modalities.iter().find(|word| !MODALITIES.contains(&word.as_str())) {
+            return Err(usage(format!("modalities: {word:?} is none of {}", MODALITIES.join(", "))));
+        }
+        if !(1..=64).contains(rgb_samples) {
+            return Err(usage(format!("rgb_samples={rgb_samples}: must be from 1 to 64")));
+        }
+        Ok(modalities)
+    }
+}
+
 impl Scene {
-    fn tree(&self) -> &Tree<'_> {
+    pub(crate) fn tree(&self) -> &Tree<'_> {
         self.cell.borrow_dependent()
     }
 
@@ -323,15 +367,32 @@ impl Scene {
         nearest.borrow_dependent()
     }
 
+    /// Makes the images that are asked for, and hands each on. Takes from the hits what becomes an image.
+    pub(crate) fn draw_all(
+        &self,
+        hits: &mut Hits,
+        camera: &Camera,
+        request: &Request,
+        mut then: impl FnMut(&str, Modality),
+    ) {
+        let Request(modalities, .., stored) = request;
+        // Depth and faces take the hits themselves, so they are made last.
+        let mut words: Vec<&str> = modalities.iter().map(String::as_str).collect();
+        words.sort_by_key(|word| (*word == "depth" && !*stored) || *word == "face");
+        words
+            .iter()
+            .for_each(|word| then(word, self.draw(word, hits, camera, request)));
+    }
+
     fn draw(&self, word: &str, hits: &mut Hits, camera: &Camera, request: &Request) -> Modality {
         let scene = self.tree();
-        let Request(_, smooth, rgb_samples, stored) = request;
+        let Request(_, smooth, rgb_samples, max_taps, stored) = request;
         let normals = if *smooth { Normals::Smooth } else { Normals::Flat };
 
         match (word, *stored) {
             ("rgb", _) => {
-                let mut rgb = rgb_image(scene, &self.mip_maps, hits, camera);
-                let filter = TextureFilter::default();
+                let filter = TextureFilter { max_taps: *max_taps };
+                let mut rgb = rgb_image_with(scene, &self.mip_maps, hits, camera, &filter);
                 sample_edges(scene, &self.mip_maps, hits, camera, &filter, *rgb_samples, &mut rgb);
                 Modality::Rgb(rgb)
             }
@@ -360,6 +421,20 @@ impl Scene {
             }
             // `render` has refused unknown words.
             _ => Modality::Face(hits.face.map(|face| face as i32)),
+        }
+    }
+}
+
+impl Modality {
+    /// Returns the bytes of all pixels.
+    pub(crate) fn bytes(&self) -> &[u8] {
+        match self {
+            Self::Rgb(image) | Self::StoredNormal(image) => image.pixels().as_flattened(),
+            Self::Depth(image) => cast_slice(image.pixels()),
+            Self::StoredDepth(image) => cast_slice(image.pixels()),
+            Self::Normal(image) | Self::Xyz(image) => cast_slice(image.pixels()),
+            Self::StoredXyz(image) => cast_slice(image.pixels().as_flattened().reinterpret_cast()),
+            Self::Face(image) => cast_slice(image.pixels()),
         }
     }
 }

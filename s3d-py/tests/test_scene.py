@@ -224,6 +224,57 @@ def test_many_views_are_those_of_single_calls_in_order(scene: s3d.Scene) -> None
         list(scene.render_many([AHEAD, np.eye(3)], K, (64, 48)))
 
 
+def test_a_stack_has_the_pixels_of_single_images(scene: s3d.Scene) -> None:
+    poses = [s3d.look_at((2, 1.5, 1.2), (3 * np.cos(a), 3 * np.sin(a), 1.0)) for a in np.linspace(0, 6, 21)]
+    ks = [K * [[f, 1, 1], [1, f, 1], [1, 1, 1]] for f in np.linspace(0.5, 1.5, len(poses))]
+    for threads, intrinsics in itertools.product((1, 3), (K, ks)):
+        stack = scene.render_stack(poses, intrinsics, (64, 48), modalities=ALL, rgb_samples=4, threads=threads)
+        assert list(stack) == list(ALL)
+        for i, pose in enumerate(poses):
+            k = ks[i] if intrinsics is ks else K
+            alone = scene.render(k, pose, (64, 48), modalities=ALL, rgb_samples=4)
+            for name in ALL:
+                assert stack[name].dtype == alone[name].dtype and stack[name].shape[0] == len(poses)
+                assert np.array_equal(stack[name][i], alone[name], equal_nan=name not in ("rgb", "face"))
+    smooth = scene.render_stack(poses[:2], K, (64, 48), modalities="normal", smooth_normals=True)
+    assert smooth["normal"].shape == (2, 48, 64, 3)
+
+    with pytest.raises(s3d.UsageError, match="texture_samples"):
+        scene.render_stack(poses, K, (64, 48), texture_samples=0)
+    with pytest.raises(s3d.UsageError, match="0 poses and 1 K"):
+        scene.render_stack([], K, (64, 48))
+    with pytest.raises(s3d.UsageError, match="21 poses and 2 K"):
+        scene.render_stack(poses, ks[:2], (64, 48))
+    with pytest.raises(s3d.UsageError, match="T_world_cam"):
+        scene.render_stack([AHEAD, np.eye(3)], K, (64, 48))
+    with pytest.raises(s3d.UsageError, match='"colour" is none of'):
+        scene.render_stack(poses, K, (64, 48), modalities=["colour"])
+    with pytest.raises(s3d.TooLargeError):
+        scene.render_stack([AHEAD] * 2000, K, (32_000, 32_000))
+
+
+def test_fewer_samples_of_textures_blur_what_is_seen_at_an_angle() -> None:
+    chequers = np.indices((64, 64)).sum(0) % 2 * 200 + np.uint8(30)
+    floor = s3d.Scene(
+        s3d.Mesh(
+            [[0, -2, 0], [4, -2, 0], [4, 2, 0], [0, 2, 0]],
+            [[0, 1, 2], [0, 2, 3]],
+            uv=[[0, 0], [1, 0], [1, 1], [0, 1]],
+            texture=np.repeat(chequers[..., None], 3, axis=2).astype(np.uint8),
+        )
+    )
+    poses = [s3d.look_at((-1, 0, 0.3), (2, 0, 0))]
+    of = {
+        samples: floor.render_stack(poses, K, (64, 48), modalities="rgb", texture_samples=samples)["rgb"][0]
+        for samples in (1, 8)
+    }
+    assert np.array_equal(of[8], floor.render(K, poses[0], (64, 48)).rgb)
+    seen = of[8].any(axis=2)
+    # Contrast is lost, the mean is not.
+    assert of[1][seen].std() < 0.8 * of[8][seen].std()
+    assert abs(of[1][seen].mean() - of[8][seen].mean()) < 8
+
+
 def test_threads_share_a_scene(scene: s3d.Scene) -> None:
     expected = scene.render(K, AHEAD, (64, 48), modalities=ALL)
     start = threading.Barrier(8)
@@ -299,6 +350,20 @@ def test_pictures_for_notebooks(scene: s3d.Scene) -> None:
         assert png[:8] == b"\x89PNG\r\n\x1a\n" and png[16:24] == (64).to_bytes(4, "big") + (48).to_bytes(
             4, "big"
         )
+
+
+def test_pictures_lie_beside_and_over_each_other(scene: s3d.Scene) -> None:
+    images = scene.render(K, AHEAD, (64, 48), modalities=ALL)
+    depth = images.picture("depth").pixels
+    near, far = np.nanargmin(images.depth), np.nanargmax(images.depth)
+    assert depth.reshape(-1, 3)[near].sum() > depth.reshape(-1, 3)[far].sum() > 0
+    assert images.picture().beside(images.picture("depth"), images.picture("normal")).pixels.shape == (48, 192, 3)
+    black = np.zeros((48, 64, 3), np.uint8)
+    half = black.copy()
+    half[:, :32] = 200
+    over = images.picture().under(s3d.Picture(half), 0.25).pixels
+    assert np.array_equal(over[:, 32:], images.rgb[:, 32:])
+    assert np.array_equal(over[:, :32], np.rint(0.75 * images.rgb[:, :32] + 50).astype(np.uint8))
 
 
 def test_images_are_those_of_the_command_to_the_bit(demo: Path, tmp_path: Path) -> None:

@@ -61,7 +61,7 @@ from ._points import (
 from ._poses import CameraPose, read_poses, save_poses
 from ._progress import Progress, Task
 from ._rays import ClosestPoints, Rays
-from ._rendered import Augment, Camera, FreeSpace, Nearby, Paper, RenderedStream, RenderedViews, Sampler
+from ._rendered import Augment, Camera, FreeSpace, Nearby, Paper, RenderedStream, RenderedViews, Sampler, walk
 from ._results import (
     Comparison,
     Evaluation,
@@ -73,10 +73,9 @@ from ._results import (
     info,
     verify,
 )
-from ._scene import Images, Scene
+from ._scene import Images, Picture, Scene
 from ._segments import Segments, segments
-from ._views import Image, Panorama, Picture, TorchDataset, View, Views
-from ._walk import walk
+from ._views import Image, Panorama, TorchDataset, View, Views
 
 __all__ = [
     "AnnotatedPoints",

@@ -34,9 +34,9 @@ from ._results import (
     root_of,
     verify,
 )
-from ._scene import Scene
+from ._scene import Picture, Scene
 from ._viewers import fiftyone_samples, log_to_rerun
-from ._views import Image, Panorama, Picture, TorchDataset, View, Views, image_at
+from ._views import Image, Panorama, TorchDataset, View, Views, image_at
 
 
 @dataclass(frozen=True)

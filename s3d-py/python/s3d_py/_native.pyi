@@ -180,7 +180,15 @@ class Scene:
         k: _Matrix | None,
         world_from_camera: _Matrix,
         size: tuple[int, int],
-        request: tuple[Sequence[str], bool, int, bool],
+        request: tuple[Sequence[str], bool, int, int, bool],
+    ) -> dict[str, npt.NDArray[Any]]: ...
+    def render_stack(
+        self,
+        ks: Sequence[_Matrix],
+        poses: Sequence[_Matrix],
+        size: tuple[int, int],
+        request: tuple[Sequence[str], bool, int, int, bool],
+        threads: int | None,
     ) -> dict[str, npt.NDArray[Any]]: ...
     def cast(self, origins: _F64, directions: _F64, threads: int | None) -> tuple[_F64, _I32]: ...
     def occluded(
@@ -195,6 +203,16 @@ class Scene:
     def place_cameras(
         self, see: float | None, apart: float | None, seed: int, threads: int | None, sink: Sink
     ) -> list[tuple[str, _Matrix]]: ...
+    def walk(
+        self,
+        frames: int,
+        speed_m_s: float,
+        rate: float,
+        height_m: float,
+        seed: int,
+        threads: int | None,
+        sink: Sink,
+    ) -> list[_Matrix]: ...
 
 @final
 class DataSet:

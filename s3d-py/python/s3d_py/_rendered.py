@@ -17,6 +17,7 @@ from ._dataset import DataSet
 from ._errors import InputError, UsageError
 from ._mesh import MeshLike
 from ._packages import for_torch
+from ._progress import Progress, sink
 from ._scene import MODALITIES, Scene
 
 _OF_LABELS = ("labels", "classes")
@@ -98,6 +99,30 @@ class FreeSpace:
         rays = scene.cast(camera.T_world_cam[:3, 3], _rays_of(camera), threads=1)
         hit = rays.face >= 0
         return bool(hit.mean() >= self.seen and np.median(np.where(hit, rays.t, np.inf)) >= self.near)
+
+
+def walk(
+    scene: Scene,
+    frames: int,
+    *,
+    speed: float = 1.0,
+    rate: float = 30.0,
+    height: float = 1.5,
+    fov: float = 75.0,
+    seed: int = 0,
+    threads: int | None = None,
+    progress: Progress = None,
+) -> list[Camera]:
+    """Returns the cameras of somebody who walks through rooms, doors and stairs: `rate` a second at `speed` metres
+    a second, `height` metres above the floor (0.3 to 2.5), looking where they go. The walk comes within 2 m of every
+    place that it can reach, the nearest first; `seed` decides where it begins. `s3d render --trajectory` renders
+    the same walk. `RenderedViews(…, sampler=walk(…))` renders the cameras in their order.
+
+    Raises `InputError` if there is no way of a metre, and says what was found.
+    """
+    count = number("frames", frames, 1)
+    poses = scene._native.walk(count, speed, rate, height, number("seed", seed, 0), threads, sink(progress))
+    return [Camera(np.array(pose), fov) for pose in poses]
 
 
 @dataclass(frozen=True)

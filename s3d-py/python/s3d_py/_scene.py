@@ -6,6 +6,7 @@ import os
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,12 +16,42 @@ from . import _native
 from ._camera import Location, Matrix, PoseLike, matrix, pose_of
 from ._checks import number
 from ._errors import InputError, UsageError
+from ._files import replaced
 from ._mesh import Mesh, MeshLike, as_mesh
 from ._progress import Progress, sink
 from ._rays import ClosestPoints, Rays, as_points, as_rays
 
 MODALITIES = ("rgb", "depth", "normal", "xyz", "face")
 """The modalities of a view; `Images` describes each."""
+
+
+class Picture:
+    """An image in colours, which notebooks show."""
+
+    def __init__(self, pixels: npt.NDArray[np.uint8]) -> None:
+        self.pixels = pixels
+
+    pixels: npt.NDArray[np.uint8]
+    """(H, W, 3), sRGB."""
+
+    def beside(self, *others: Picture) -> Picture:
+        """Returns pictures of the same height in a row, this one first."""
+        return Picture(np.concatenate([self.pixels, *(other.pixels for other in others)], axis=1))
+
+    def under(self, other: Picture, share: float = 0.5) -> Picture:
+        """Returns a picture of the same size in which another one lies over this one, by a share of 0 to 1. Where
+        the other is black, this one stays.
+        """
+        mixed = np.rint((1.0 - share) * self.pixels + share * other.pixels).astype(np.uint8)
+        return Picture(np.where(other.pixels.any(axis=2, keepdims=True), mixed, self.pixels))
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Writes it as a PNG file."""
+        with replaced(Path(path)) as file:
+            file.write(self._repr_png_())
+
+    def _repr_png_(self) -> bytes:
+        return _native.encode_png(np.ascontiguousarray(self.pixels))
 
 
 class Images:
@@ -83,6 +114,12 @@ class Images:
         """(H, W), index of the mesh's face. −1 where nothing is seen."""
         return self["face"]
 
+    def picture(self, modality: str = "rgb") -> Picture:
+        """Returns one of the images in colours to look at: depth from light (near) to dark, coordinates as red, green
+        and blue, each face in a colour; black where nothing is seen.
+        """
+        return Picture(picture(modality, self[modality]))
+
     def __repr__(self) -> str:
         width, height = self.size
         kind = "panorama" if self.K is None else "view"
@@ -90,8 +127,11 @@ class Images:
 
     def _repr_png_(self) -> bytes:
         """Returns the first image as PNG, for notebooks."""
-        name, array = next(iter(self._arrays.items()))
-        return _native.encode_png(picture(name, array))
+        return self.picture(next(iter(self._arrays)))._repr_png_()
+
+
+_SCALE = [(255, 244, 180), (250, 170, 70), (205, 75, 85), (105, 35, 115), (20, 15, 60)]
+"""Colours of numbers, from the least to the largest: what is near is light."""
 
 
 def picture(name: str, array: npt.NDArray[Any]) -> npt.NDArray[np.uint8]:
@@ -109,10 +149,30 @@ def picture(name: str, array: npt.NDArray[Any]) -> npt.NDArray[np.uint8]:
             (np.nanmin(array, (0, 1)), np.nanmax(array, (0, 1))) if np.isfinite(array).any() else (0.0, 1.0)
         )
         shown = (array - low) / np.maximum(high - low, 1e-9)
-    colors = np.nan_to_num(255.0 * shown).astype(np.uint8)
-    return np.ascontiguousarray(
-        np.broadcast_to(colors[..., None] if colors.ndim == 2 else colors, (*array.shape[:2], 3))
-    )
+    if shown.ndim == 2:
+        at = np.linspace(0.0, 1.0, len(_SCALE))
+        shown = np.stack([np.interp(shown, at, channel) for channel in np.array(_SCALE).T], -1) / 255.0
+    return np.nan_to_num(255.0 * shown).astype(np.uint8)
+
+
+def _request(
+    size: tuple[int, int],
+    modalities: Sequence[str],
+    rgb_samples: int,
+    smooth_normals: bool,
+    stored: bool,
+    texture_samples: int = 8,
+) -> tuple[tuple[list[str], bool, int, int, bool], tuple[int, int]]:
+    """Returns what to render, and width and height, as the native code takes them."""
+    words = list(dict.fromkeys([modalities] if isinstance(modalities, str) else modalities))
+    if not words:
+        raise UsageError(f"modalities: name some of {', '.join(MODALITIES)}")
+    width, height = size
+    if not all(isinstance(side, (int, np.integer)) and side > 0 for side in size):
+        raise UsageError(f"size=({width}, {height}): width and height must be whole numbers from 1")
+    samples = number("rgb_samples", rgb_samples, 1, 64)
+    taps = number("texture_samples", texture_samples, 1, 64)
+    return (words, bool(smooth_normals), samples, taps, stored), (int(width), int(height))
 
 
 class Scene:
@@ -237,6 +297,33 @@ class Scene:
         return self._arrays(
             intrinsics, pose_of(T_world_cam), size, modalities, rgb_samples, smooth_normals, True
         )
+
+    def render_stack(
+        self,
+        poses: Iterable[PoseLike],
+        K: npt.ArrayLike,
+        size: tuple[int, int],
+        *,
+        modalities: Sequence[str] = ("rgb", "depth", "normal"),
+        rgb_samples: int = 1,
+        texture_samples: int = 8,
+        smooth_normals: bool = False,
+        threads: int | None = None,
+    ) -> dict[str, npt.NDArray[Any]]:
+        """Renders N cameras of one size at once: for many small images, as simulators and samplers want them. Returns
+        an array by modality, (N, H, W) or (N, H, W, 3), with the pixels of `render`. `K` is (3, 3), or (N, 3, 3).
+        `texture_samples` is the most samples of a texture in a pixel: 1 takes half the time, and blurs what is seen
+        at an angle.
+
+        Raises what `render` raises.
+        """
+        matrices = [pose_of(pose).tolist() for pose in poses]
+        ks = [matrix("K", k, (3, 3)).tolist() for k in (K if np.ndim(K) == 3 else [K])]  # type: ignore[union-attr]
+        if not matrices or len(ks) not in (1, len(matrices)):
+            raise UsageError(f"{len(matrices)} poses and {len(ks)} K: one K for all poses, or one for each")
+        request, (width, height) = _request(size, modalities, rgb_samples, smooth_normals, False, texture_samples)
+        made = self._native.render_stack(ks, matrices, (width, height), request, threads)
+        return {word: made[word] for word in request[0]}
 
     def cast(
         self, origins: npt.ArrayLike, directions: npt.ArrayLike | None = None, *, threads: int | None = None
@@ -363,13 +450,6 @@ class Scene:
         smooth_normals: bool,
         stored: bool,
     ) -> dict[str, npt.NDArray[Any]]:
-        words = list(dict.fromkeys([modalities] if isinstance(modalities, str) else modalities))
-        if not words:
-            raise UsageError(f"modalities: name some of {', '.join(MODALITIES)}")
-        width, height = size
-        if not all(isinstance(side, (int, np.integer)) and side > 0 for side in size):
-            raise UsageError(f"size=({width}, {height}): width and height must be whole numbers from 1")
-        request = (words, bool(smooth_normals), number("rgb_samples", rgb_samples, 1, 64), stored)
-        k = None if K is None else K.tolist()
-        made = self._native.render(k, T.tolist(), (int(width), int(height)), request)
-        return {word: made[word] for word in words}
+        request, (width, height) = _request(size, modalities, rgb_samples, smooth_normals, stored)
+        made = self._native.render(None if K is None else K.tolist(), T.tolist(), (width, height), request)
+        return {word: made[word] for word in request[0]}

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, TypeVar, Union, overload
+from typing import TYPE_CHECKING, Any, Generic, TypeVar, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -17,9 +17,8 @@ from . import _native
 from ._camera import Matrix
 from ._checks import number, rows
 from ._errors import UsageError
-from ._files import replaced
 from ._packages import for_torch
-from ._scene import picture
+from ._scene import Picture, picture
 
 if TYPE_CHECKING:
     from ._dataset import DataSet
@@ -276,7 +275,8 @@ class Image:
 
     def picture(self, modality: str = "rgb") -> Picture:
         """Returns a modality in colours to look at: classes in those of the data set, labels in those of instances,
-        depth and coordinates in gray levels. Notebooks show it.
+        depth from light (near) to dark, coordinates as red, green and blue; black where nothing is known. Notebooks
+        show it.
         """
         array = self[modality]
         if modality in ("classes", "refined_classes"):
@@ -395,24 +395,6 @@ def _whole_numbers(what: str, values: Sequence[int], count: int, least: int) -> 
 
 
 Some = TypeVar("Some", bound=Image, covariant=True)
-
-
-class Picture:
-    """An image in colours, which notebooks show."""
-
-    def __init__(self, pixels: npt.NDArray[np.uint8]) -> None:
-        self.pixels = pixels
-
-    pixels: npt.NDArray[np.uint8]
-    """(H, W, 3), sRGB."""
-
-    def save(self, path: Union[str, Path]) -> None:
-        """Writes it as a PNG file."""
-        with replaced(Path(path)) as file:
-            file.write(self._repr_png_())
-
-    def _repr_png_(self) -> bytes:
-        return _native.encode_png(np.ascontiguousarray(self.pixels))
 
 
 def image_at(dataset: DataSet, index: int) -> View | Panorama:
