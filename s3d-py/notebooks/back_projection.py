@@ -32,7 +32,7 @@ camera = rays * view.depth[..., None]
 world = camera @ view.T_world_cam[:3, :3].T + view.T_world_cam[:3, 3]
 print("largest difference to View.points:", np.nanmax(np.abs(world - view.points())), "m")
 assert np.nanmax(np.abs(world - view.points())) < 1e-4
-view
+view.picture().beside(view.picture("depth"), view.picture("normal"))
 
 # %% [markdown]
 # ## A cloud of all images of a room
@@ -47,6 +47,21 @@ rgb = np.concatenate([image.rgb.reshape(-1, 3) for image in images])
 seen = np.isfinite(xyz).all(1)
 s3d.save_points("room.ply", xyz[seen], rgb[seen])
 print(f"{seen.sum():,} points of {len(images)} images in room.ply")
+
+# %% [markdown]
+# The room from above: points whose label is of the room, without what is higher than two metres. Each pixel of the plan,
+# 1.5 cm wide, has the colour of the highest point in it.
+
+# %%
+labels = np.concatenate([image.labels.reshape(-1) for image in images])
+is_of_room = np.array([False] + [label.room == room for label in ds.labels[1:]])
+kept = seen & (labels > 0) & is_of_room[labels]
+kept &= xyz[:, 2] < np.nanmin(xyz[kept, 2]) + 2.0
+from_below = np.flatnonzero(kept)[np.argsort(xyz[kept, 2])]
+column, row = ((xyz[from_below, :2] - xyz[from_below, :2].min(axis=0)) / 0.015).astype(int).T
+plan = np.zeros((row.max() + 1, column.max() + 1, 3), np.uint8)
+plan[row.max() - row, column] = rgb[from_below]
+s3d.Picture(plan)
 
 # %% [markdown]
 # The points lie on the mesh: a ray from the camera through each point meets the mesh there, within the step of the depth
@@ -71,6 +86,7 @@ assert np.nanmedian(off) < 0.002
 # %%
 T_cam_world = np.linalg.inv(view.T_world_cam)
 rows = []
+best: dict[str, np.ndarray] = {}
 for other in ds.views(location=view.location):
     if other.index == view.index:
         continue
@@ -82,6 +98,14 @@ for other in ds.views(location=view.location):
     same = np.abs(view.depth[row, column] - in_camera[inside, 2]) < 0.02
     label = other.labels.reshape(-1)[inside]
     rows.append((other.name, int(same.sum()), int((view.labels[row, column] == label)[same].sum())))
+    best[other.name] = np.zeros_like(view.rgb)
+    best[other.name][row[same], column[same]] = other.rgb.reshape(-1, 3)[inside][same]
 name, shared, agreeing = max(rows, key=lambda row: row[1])
 print(f"{name} shares {shared:,} pixels, of which {agreeing / shared:.1%} have the same label")
 assert shared > 1000 and agreeing / shared > 0.97
+
+# %% [markdown]
+# The view, and what the other view shows of it: its colours, moved to where their points are seen from here.
+
+# %%
+view.picture().beside(s3d.Picture(best[name]))

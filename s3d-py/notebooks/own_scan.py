@@ -41,6 +41,17 @@ Path("panorama.png").write_bytes(panorama._repr_png_())
 panorama
 
 # %% [markdown]
+# ## What somebody sees who walks through
+#
+# A walk of half a minute, and every eighth second of it. `s3d render --trajectory 30 --video` makes a video of the same walk.
+
+# %%
+cameras = s3d.walk(scene, 900)
+stops = scene.render_many([c.T_world_cam for c in cameras[::240]], s3d.intrinsics((320, 240), 75), (320, 240))
+first, *others = [s3d.Picture(stop.rgb) for stop in stops]
+first.beside(*others)
+
+# %% [markdown]
 # ## Labels
 #
 # Without labels the data set has everything else. Annotated points of the scan, in any format that `read_points` knows,
@@ -74,4 +85,4 @@ page = ds.report("own_page", overwrite=True)
 print("open", page)
 view = max(ds.views(), key=lambda view: len(view.shares))
 print(view, view.shares)
-view
+view.picture().beside(view.picture("depth"), view.picture("normal"), view.picture().under(view.picture("classes")))

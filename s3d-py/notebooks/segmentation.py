@@ -70,12 +70,23 @@ for fold in (0, 1):
 # %%
 scores = ds.evaluate("sem-pano", "classes", bootstrap=200)
 print(scores)
+Path(f"classes/{panoramas[0].name}.png").rename("learnt.png")
 learnt = scores.score("mean", "IoU")
 for view in panoramas:
     Image.fromarray(np.full(view.classes.shape, (ds.classes or []).index("wall"), np.uint8)).save(f"classes/{view.name}.png")
 guessed = ds.evaluate("sem-pano", "classes").score("mean", "IoU")
 print(f"mean IoU: learnt {learnt:.3f}, all wall {guessed:.3f}")
 assert learnt > 3 * guessed
+
+# %% [markdown]
+# A panorama, its classes, and what was learnt in other rooms.
+
+# %%
+view = panoramas[0]
+found = Image.open("learnt.png")
+colors = np.asarray(ds.class_colors)
+rows = [view.rgb, view.picture("classes").pixels, colors[np.asarray(found)]]
+s3d.Picture(np.vstack([row[row.shape[0] // 4 : -row.shape[0] // 4] for row in rows]))
 
 # %% [markdown]
 # ## With torch

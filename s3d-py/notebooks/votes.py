@@ -44,16 +44,17 @@ for place in np.argsort(-count)[:5]:
 # %% [markdown]
 # ## Seen in an image
 #
-# The image of faces turns columns of faces into images: here bright where the vote was sure, black without votes.
+# The image of faces turns columns of faces into images: here red where points voted for several labels.
 
 # %%
 scene = s3d.Scene(mesh)
 place = scene.place_cameras(see=0.5)[0]
-image = scene.panorama(place, width=1024, modalities=["face"])
+image = scene.panorama(place, width=1024, modalities=["rgb", "face"])
 of_face = np.where(labelled, np.nan_to_num(votes.share), 0.0)
 shown = np.where(image.face >= 0, of_face[image.face], 0.0)
 print(f"a pixel's face was won by {shown[shown > 0].mean():.1%} of its votes on average")
-s3d.Picture(np.repeat((255 * shown).astype(np.uint8)[..., None], 3, axis=2))
+doubt = np.sqrt(1 - shown)[..., None]
+s3d.Picture((image.rgb * (1 - doubt) + np.array([230, 30, 30]) * doubt).astype(np.uint8))
 
 # %% [markdown]
 # ## Fewer points
@@ -78,3 +79,18 @@ for within in (0.0, 0.1, 0.3, 1.0):
     print(f"filled within {within} m: {covered:.1%} of the surface labelled, {right:.1%} of it right")
 before, after = told(sparse.label), told(sparse.filled(0.3))
 assert after[0] > before[0] and after[1] > 0.9
+
+# %% [markdown]
+# The labels of few points, and what `filled` makes of them, over the same picture. Each object has a colour of its own.
+
+# %%
+colors = np.random.default_rng(3).integers(40, 256, (len(points.names), 3)).astype(np.uint8)
+
+
+def shown_over(label: np.ndarray) -> s3d.Picture:
+    """Returns the panorama with the labels of its faces; what has none stays as it is."""
+    of_pixel = np.where(image.face >= 0, label[image.face], -1)
+    return image.picture().under(s3d.Picture(np.where(of_pixel[..., None] < 0, 0, colors[of_pixel])), 0.6)
+
+
+s3d.Picture(np.vstack([shown_over(sparse.label).pixels, shown_over(sparse.filled(0.3)).pixels]))

@@ -33,5 +33,5 @@ def test_a_notebook(notebook: str, folder: Path) -> None:
     assert len(run.stdout.splitlines()) >= 3
 
 
-def test_there_are_six() -> None:
-    assert len(list(NOTEBOOKS.glob("*.py"))) == 6
+def test_there_are_seven() -> None:
+    assert len(list(NOTEBOOKS.glob("*.py"))) == 7
