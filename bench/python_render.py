@@ -43,9 +43,6 @@ def main():
     ways = {" + ".join(m): render(*m) for m in kinds}
     for m in kinds[2:]:
         ways[f"stack of {' + '.join(m)}"] = lambda m=m: scene.render_stack(poses, K, size, modalities=m, threads=1)
-    ways["the same, textures trilinear"] = lambda: scene.render_stack(
-        poses, K, size, modalities=kinds[3], texture_samples=1, threads=1
-    )
     try:
         import open3d as o3d
     except ImportError:

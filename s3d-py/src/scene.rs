@@ -18,7 +18,7 @@ use s3d_io::image::{Compression, Content, encode_rgb8};
 use s3d_io::mesh::MeshFile;
 use s3d_render::{
     Hits, MipMaps, NO_FACE, Normals, TextureFilter, are_inside, are_rays_blocked, cast, cast_rays,
-    correspondences, count_hits, depth_image, normal_image, normal_vectors, rgb_image_with, sample_edges,
+    correspondences, count_hits, depth_image, normal_image, normal_vectors, rgb_image, sample_edges,
     xyz_image, xyz_image_half,
 };
 use self_cell::self_cell;
@@ -53,11 +53,10 @@ pub(crate) struct Scene {
     nearest: OnceLock<MeshAndNearest>,
 }
 
-/// The request for a view: modalities, smooth normals, colour samples of a pixel at an edge, the most samples
-/// of a texture in a pixel, and whether pixels are as the files of a data set store them, instead of numbers
-/// in metres.
+/// The request for a view: modalities, smooth normals, colour samples of a pixel, and whether pixels are as
+/// the files of a data set store them, instead of numbers in metres.
 #[derive(FromPyObject)]
-pub(crate) struct Request(Vec<String>, bool, u32, u32, bool);
+pub(crate) struct Request(Vec<String>, bool, u32, bool);
 
 /// A camera: K, or none for a panorama, the pose, and width and height.
 #[derive(FromPyObject)]
@@ -386,13 +385,13 @@ impl Scene {
 
     fn draw(&self, word: &str, hits: &mut Hits, camera: &Camera, request: &Request) -> Modality {
         let scene = self.tree();
-        let Request(_, smooth, rgb_samples, max_taps, stored) = request;
+        let Request(_, smooth, rgb_samples, stored) = request;
         let normals = if *smooth { Normals::Smooth } else { Normals::Flat };
 
         match (word, *stored) {
             ("rgb", _) => {
-                let filter = TextureFilter { max_taps: *max_taps };
-                let mut rgb = rgb_image_with(scene, &self.mip_maps, hits, camera, &filter);
+                let mut rgb = rgb_image(scene, &self.mip_maps, hits, camera);
+                let filter = TextureFilter::default();
                 sample_edges(scene, &self.mip_maps, hits, camera, &filter, *rgb_samples, &mut rgb);
                 Modality::Rgb(rgb)
             }

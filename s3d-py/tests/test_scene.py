@@ -239,8 +239,6 @@ def test_a_stack_has_the_pixels_of_single_images(scene: s3d.Scene) -> None:
     smooth = scene.render_stack(poses[:2], K, (64, 48), modalities="normal", smooth_normals=True)
     assert smooth["normal"].shape == (2, 48, 64, 3)
 
-    with pytest.raises(s3d.UsageError, match="texture_samples"):
-        scene.render_stack(poses, K, (64, 48), texture_samples=0)
     with pytest.raises(s3d.UsageError, match="0 poses and 1 K"):
         scene.render_stack([], K, (64, 48))
     with pytest.raises(s3d.UsageError, match="21 poses and 2 K"):
@@ -251,28 +249,6 @@ def test_a_stack_has_the_pixels_of_single_images(scene: s3d.Scene) -> None:
         scene.render_stack(poses, K, (64, 48), modalities=["colour"])
     with pytest.raises(s3d.TooLargeError):
         scene.render_stack([AHEAD] * 2000, K, (32_000, 32_000))
-
-
-def test_fewer_samples_of_textures_blur_what_is_seen_at_an_angle() -> None:
-    chequers = np.indices((64, 64)).sum(0) % 2 * 200 + np.uint8(30)
-    floor = s3d.Scene(
-        s3d.Mesh(
-            [[0, -2, 0], [4, -2, 0], [4, 2, 0], [0, 2, 0]],
-            [[0, 1, 2], [0, 2, 3]],
-            uv=[[0, 0], [1, 0], [1, 1], [0, 1]],
-            texture=np.repeat(chequers[..., None], 3, axis=2).astype(np.uint8),
-        )
-    )
-    poses = [s3d.look_at((-1, 0, 0.3), (2, 0, 0))]
-    of = {
-        samples: floor.render_stack(poses, K, (64, 48), modalities="rgb", texture_samples=samples)["rgb"][0]
-        for samples in (1, 8)
-    }
-    assert np.array_equal(of[8], floor.render(K, poses[0], (64, 48)).rgb)
-    seen = of[8].any(axis=2)
-    # Contrast is lost, the mean is not.
-    assert of[1][seen].std() < 0.8 * of[8][seen].std()
-    assert abs(of[1][seen].mean() - of[8][seen].mean()) < 8
 
 
 def test_threads_share_a_scene(scene: s3d.Scene) -> None:

@@ -180,14 +180,14 @@ class Scene:
         k: _Matrix | None,
         world_from_camera: _Matrix,
         size: tuple[int, int],
-        request: tuple[Sequence[str], bool, int, int, bool],
+        request: tuple[Sequence[str], bool, int, bool],
     ) -> dict[str, npt.NDArray[Any]]: ...
     def render_stack(
         self,
         ks: Sequence[_Matrix],
         poses: Sequence[_Matrix],
         size: tuple[int, int],
-        request: tuple[Sequence[str], bool, int, int, bool],
+        request: tuple[Sequence[str], bool, int, bool],
         threads: int | None,
     ) -> dict[str, npt.NDArray[Any]]: ...
     def cast(self, origins: _F64, directions: _F64, threads: int | None) -> tuple[_F64, _I32]: ...

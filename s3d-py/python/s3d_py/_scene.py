@@ -161,8 +161,7 @@ def _request(
     rgb_samples: int,
     smooth_normals: bool,
     stored: bool,
-    texture_samples: int = 8,
-) -> tuple[tuple[list[str], bool, int, int, bool], tuple[int, int]]:
+) -> tuple[tuple[list[str], bool, int, bool], tuple[int, int]]:
     """Returns what to render, and width and height, as the native code takes them."""
     words = list(dict.fromkeys([modalities] if isinstance(modalities, str) else modalities))
     if not words:
@@ -171,8 +170,7 @@ def _request(
     if not all(isinstance(side, (int, np.integer)) and side > 0 for side in size):
         raise UsageError(f"size=({width}, {height}): width and height must be whole numbers from 1")
     samples = number("rgb_samples", rgb_samples, 1, 64)
-    taps = number("texture_samples", texture_samples, 1, 64)
-    return (words, bool(smooth_normals), samples, taps, stored), (int(width), int(height))
+    return (words, bool(smooth_normals), samples, stored), (int(width), int(height))
 
 
 class Scene:
@@ -306,14 +304,11 @@ class Scene:
         *,
         modalities: Sequence[str] = ("rgb", "depth", "normal"),
         rgb_samples: int = 1,
-        texture_samples: int = 8,
         smooth_normals: bool = False,
         threads: int | None = None,
     ) -> dict[str, npt.NDArray[Any]]:
         """Renders N cameras of one size at once: for many small images, as simulators and samplers want them. Returns
         an array by modality, (N, H, W) or (N, H, W, 3), with the pixels of `render`. `K` is (3, 3), or (N, 3, 3).
-        `texture_samples` is the most samples of a texture in a pixel: 1 takes half the time, and blurs what is seen
-        at an angle.
 
         Raises what `render` raises.
         """
@@ -321,7 +316,7 @@ class Scene:
         ks = [matrix("K", k, (3, 3)).tolist() for k in (K if np.ndim(K) == 3 else [K])]  # type: ignore[union-attr]
         if not matrices or len(ks) not in (1, len(matrices)):
             raise UsageError(f"{len(matrices)} poses and {len(ks)} K: one K for all poses, or one for each")
-        request, (width, height) = _request(size, modalities, rgb_samples, smooth_normals, False, texture_samples)
+        request, (width, height) = _request(size, modalities, rgb_samples, smooth_normals, False)
         made = self._native.render_stack(ks, matrices, (width, height), request, threads)
         return {word: made[word] for word in request[0]}
 
