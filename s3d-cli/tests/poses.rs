@@ -386,7 +386,7 @@ fn a_walk_or_a_video_that_cannot_be_is_refused_before_anything_is_made() {
         assert!(!out.exists(), "something was written");
     };
     fails(&["--trajectory", "0"], 2, &["--trajectory", "above 0"]);
-    fails(&["--trajectory", "1e9"], 2, &["--trajectory: must be 1 to 1000000 images"]);
+    fails(&["--trajectory", "1e9"], 2, &["--trajectory: must be 1 to 1000000 images, at the rate"]);
     fails(&["--trajectory", "5", "--at", "1,1,1"], 2, &["cannot be used with"]);
     fails(&["--at", "1,1,1", "--speed", "2"], 2, &["cannot be used with"]);
     fails(&["--poses", "cameras.csv", "--eye-height", "1"], 2, &["cannot be used with"]);

@@ -40,7 +40,8 @@ def features(view: s3d.View) -> np.ndarray:
 # %% [markdown]
 # ## Two folds
 #
-# Rooms with even numbers and rooms with odd numbers are two folds: no pixel is predicted by a model that saw its room.
+# Rooms with even numbers and rooms with odd numbers are two folds: no panorama is predicted by a model that saw one of its
+# room. (Through open doors it may have seen a part of it.)
 
 # %%
 rooms = sorted({view.room for view in panoramas})
@@ -94,7 +95,7 @@ s3d.Picture(np.vstack([row[row.shape[0] // 4 : -row.shape[0] // 4] for row in ro
 # The same images for a network of your own: `ignore_index=-1` leaves out unlabelled pixels.
 #
 # ```python
-# train = ds.views().torch(["rgb", "depth", "classes"], transform=augment)
+# train = ds.views().torch(["rgb", "depth", "classes"])
 # loader = torch.utils.data.DataLoader(train, batch_size=8, shuffle=True, num_workers=8)
 # loss = torch.nn.CrossEntropyLoss(ignore_index=-1)
 # ```

@@ -50,9 +50,9 @@ for place in np.argsort(-count)[:5]:
 scene = s3d.Scene(mesh)
 place = scene.place_cameras(see=0.5)[0]
 image = scene.panorama(place, width=1024, modalities=["rgb", "face"])
-of_face = np.where(labelled, np.nan_to_num(votes.share), 0.0)
-shown = np.where(image.face >= 0, of_face[image.face], 0.0)
-print(f"a pixel's face was won by {shown[shown > 0].mean():.1%} of its votes on average")
+of_face = np.where(labelled, votes.share, 1.0)
+shown = np.where(image.face >= 0, of_face[image.face], 1.0)
+print(f"a pixel's face was won by {shown.mean():.1%} of its votes on average")
 doubt = np.sqrt(1 - shown)[..., None]
 s3d.Picture((image.rgb * (1 - doubt) + np.array([230, 30, 30]) * doubt).astype(np.uint8))
 

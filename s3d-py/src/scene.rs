@@ -118,6 +118,7 @@ impl Scene {
 
     /// Returns the images of pinhole cameras of one size by name, each in one array: one K for all or one for
     /// each, and the poses.
+    #[allow(clippy::too_many_arguments)]
     fn render_stack<'py>(
         &self,
         py: Python<'py>,
@@ -126,13 +127,14 @@ impl Scene {
         size: [u32; 2],
         request: Request,
         threads: Option<usize>,
+        sink: Py<PyAny>,
     ) -> PyResult<Bound<'py, PyDict>> {
         let ks = ks.iter().cycle().take(poses.len());
         let cameras = ks
             .zip(&poses)
             .map(|(k, pose)| camera(Some(*k), *pose, size))
             .collect::<PyResult<Vec<_>>>()?;
-        stack::render_stack(py, self, &cameras, size, &request, threads)
+        stack::render_stack(py, self, &cameras, size, &request, threads, &sink)
     }
 
     /// Returns the first hit of each ray: t, the multiple of the direction (NaN for no hit), and the face

@@ -2,7 +2,7 @@
 
 use crate::error::exception;
 use crate::scene::{Request, Scene, bytes_of};
-use crate::work::detached;
+use crate::work::watched;
 use bytemuck::cast_slice_mut;
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
@@ -23,6 +23,7 @@ pub(crate) fn render_stack<'py>(
     [width, height]: [u32; 2],
     request: &Request,
     threads: Option<usize>,
+    sink: &Py<PyAny>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let words = request.modalities()?;
     let pixels = cameras.len() * width as usize * height as usize;
@@ -31,7 +32,8 @@ pub(crate) fn render_stack<'py>(
     check_memory(&what, bytes * pixels as f64).map_err(|e| exception(&e))?;
 
     let mut stacks: Vec<Stack> = words.iter().map(|word| Stack::new(word, pixels)).collect();
-    detached(py, threads, || {
+    watched(py, threads, sink, |ctx| {
+        let progress = ctx.progress("rendering", "images", cameras.len() as u64);
         // Each image has a place in each stack.
         let mut places: Vec<Vec<&mut [u8]>> = cameras.iter().map(|_| Vec::new()).collect();
         for stack in &mut stacks {
@@ -45,17 +47,20 @@ pub(crate) fn render_stack<'py>(
         }
 
         let images = places.into_par_iter().zip(cameras).with_min_len(IMAGES);
-        images.for_each_init(
+        images.try_for_each_init(
             || Caster::new(scene.tree()),
             |caster, (places, camera)| {
+                ctx.check()?;
                 let mut hits = caster.cast(camera);
                 let mut places: Vec<_> = words.iter().map(String::as_str).zip(places).collect();
                 scene.draw_all(&mut hits, camera, request, |word, image| {
                     let of_word = places.iter_mut().filter(|(asked, _)| *asked == word);
                     of_word.for_each(|(_, place)| place.copy_from_slice(image.bytes()));
                 });
+                progress.add(1);
+                Ok(())
             },
-        );
+        )
     })?;
 
     let size = [cameras.len(), height as usize, width as usize];

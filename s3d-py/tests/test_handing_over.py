@@ -123,6 +123,15 @@ def test_wrong_poses_are_told(ds: s3d.DataSet, tmp_path: Path) -> None:
             s3d.save_poses(tmp_path / name, poses)
     with pytest.raises(s3d.MissingFileError):
         s3d.read_poses(tmp_path / "gone.json")
+    # A matrix that is no pose would come back as another one.
+    s3d.save_poses(tmp_path / "kept.txt", [bare])
+    kept = (tmp_path / "kept.txt").read_bytes()
+    for wrong in (2 * AHEAD, AHEAD.T, AHEAD * [-1, 1, 1, 1], AHEAD * np.nan):
+        with pytest.raises(s3d.UsageError, match="1: T_world_cam"):
+            s3d.save_poses(tmp_path / "kept.txt", [s3d.CameraPose("1", wrong, K, (64, 48))])
+    with pytest.raises(s3d.UsageError, match="some CameraPose"):
+        s3d.save_poses(tmp_path / "kept.txt", [AHEAD])  # type: ignore[list-item]
+    assert (tmp_path / "kept.txt").read_bytes() == kept
 
 
 def test_meshes_are_cut_moved_and_joined(tmp_path: Path) -> None:
@@ -138,6 +147,11 @@ def test_meshes_are_cut_moved_and_joined(tmp_path: Path) -> None:
     assert both.area == pytest.approx(2 * room.area) and len(both.faces) == 28
     assert np.array_equal(both.with_faces(np.arange(28) >= 14).vertices, moved.vertices)
     assert np.array_equal(room.with_faces([3, 1]).faces, room.with_faces([1, 3]).faces)
+    # Faces keep their numbers.
+    assert room.with_faces([3, 1]).source_faces.tolist() == [1, 3]
+    assert low.transformed(turn).source_faces.tolist() == low.source_faces.tolist() and len(low.source_faces) == 4
+    assert low.cropped([[-1, -1, 0.5], [9, 9, 0.75]]).source_faces.tolist() == low.source_faces[-2:].tolist()
+    assert both.source_faces.tolist() == list(range(28))
     wrong: list[tuple[Any, str]] = [
         (lambda: room.with_faces([99]), "faces: 99"),
         (lambda: room.transformed(np.zeros((4, 4))), "affine"),

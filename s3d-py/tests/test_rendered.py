@@ -188,6 +188,15 @@ def test_a_walk_is_smooth_and_goes_through_doors(ds: s3d.DataSet) -> None:
     labels = ds.votes().label[floors]  # type: ignore[union-attr]
     assert len({ds.labels[label].room for label in np.unique(labels) if label > 0}) >= 2
 
+    with pytest.raises(s3d.CancelledError):
+        s3d.walk(scene, 100_000, progress=lambda task: False)
+    with pytest.raises(s3d.UsageError, match="fov=0"):
+        s3d.walk(scene, 9, fov=0)
+    of_path = s3d.walk(ds.root / "scan" / "rgb.obj", 9, seed=1)
+    assert np.allclose(of_path[8].T_world_cam, cameras[8].T_world_cam, atol=1e-6)
+    with pytest.raises(s3d.UsageError, match="each a Camera"):
+        s3d.RenderedViews(ds, sampler=[eyes[0]])  # type: ignore[list-item]
+
     views = s3d.RenderedViews(ds, size=(32, 32), modalities=["depth"], sampler=cameras[:5])
     assert len(views) == 5 and np.array_equal(views[4]["T_world_cam"], cameras[4].T_world_cam.astype(np.float32))
     assert all(np.array_equal(a.T_world_cam, b.T_world_cam) for a, b in zip(cameras, s3d.walk(scene, 900, seed=1)))

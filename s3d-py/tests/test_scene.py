@@ -224,6 +224,10 @@ def test_many_views_are_those_of_single_calls_in_order(scene: s3d.Scene) -> None
         list(scene.render_many([AHEAD, np.eye(3)], K, (64, 48)))
 
 
+def _interrupt() -> None:
+    raise KeyboardInterrupt
+
+
 def test_a_stack_has_the_pixels_of_single_images(scene: s3d.Scene) -> None:
     poses = [s3d.look_at((2, 1.5, 1.2), (3 * np.cos(a), 3 * np.sin(a), 1.0)) for a in np.linspace(0, 6, 21)]
     ks = [K * [[f, 1, 1], [1, f, 1], [1, 1, 1]] for f in np.linspace(0.5, 1.5, len(poses))]
@@ -239,7 +243,14 @@ def test_a_stack_has_the_pixels_of_single_images(scene: s3d.Scene) -> None:
     smooth = scene.render_stack(poses[:2], K, (64, 48), modalities="normal", smooth_normals=True)
     assert smooth["normal"].shape == (2, 48, 64, 3)
 
-    with pytest.raises(s3d.UsageError, match="0 poses and 1 K"):
+    # Anything with a pose will do.
+    posed = scene.render_stack([s3d.CameraPose("a", AHEAD), s3d.Camera(AHEAD, 75.0)], K, (64, 48))
+    assert np.array_equal(posed["rgb"][0], posed["rgb"][1])
+    with pytest.raises(KeyboardInterrupt):
+        scene.render_stack([AHEAD] * 5000, K, (64, 48), progress=lambda task: _interrupt())
+    with pytest.raises(s3d.UsageError, match="size=64"):
+        scene.render_stack(poses, K, 64)  # type: ignore[arg-type]
+    with pytest.raises(s3d.UsageError, match="poses: there are none"):
         scene.render_stack([], K, (64, 48))
     with pytest.raises(s3d.UsageError, match="21 poses and 2 K"):
         scene.render_stack(poses, ks[:2], (64, 48))
@@ -340,6 +351,17 @@ def test_pictures_lie_beside_and_over_each_other(scene: s3d.Scene) -> None:
     over = images.picture().under(s3d.Picture(half), 0.25).pixels
     assert np.array_equal(over[:, 32:], images.rgb[:, 32:])
     assert np.array_equal(over[:, :32], np.rint(0.75 * images.rgb[:, :32] + 50).astype(np.uint8))
+
+    small = s3d.Picture(np.zeros((8, 8, 3), np.uint8))
+    for call, words in (
+        (lambda: s3d.Picture(np.zeros((8, 8, 3))), "uint8"),  # type: ignore[arg-type]
+        (lambda: images.picture().beside(small), "one height"),
+        (lambda: images.picture().under(small), "one size"),
+        (lambda: small.under(small, 2.0), "share=2.0"),
+        (lambda: small.save("picture.jpg"), "written as .png"),
+    ):
+        with pytest.raises(s3d.UsageError, match=words):
+            call()
 
 
 def test_images_are_those_of_the_command_to_the_bit(demo: Path, tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import pickle
 import resource
 import subprocess
 import sys
@@ -238,6 +239,23 @@ def test_points_are_written_in_the_form_that_they_are_named_after(tmp_path: Path
     las = laspy.read(tmp_path / "points.las")
     assert np.allclose(las.xyz, xyz, atol=1e-4) and las.label.tolist() == [7, -1]
     assert (np.stack([las.red, las.green, las.blue], -1) // 257).tolist() == rgb.tolist()
+
+
+def test_faces_of_arrays_keep_their_numbers(caplog: pytest.LogCaptureFixture) -> None:
+    corners = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0, 0]]
+    # The second has no area, and the fourth repeats the first.
+    faces = [[0, 1, 2], [0, 1, 4], [0, 2, 3], [2, 0, 1], [1, 4, 2]]
+    mesh = s3d.Mesh(corners, faces)
+    assert len(mesh.faces) == 3 and mesh.source_faces.tolist() == [0, 2, 4]
+    assert [text.split(":")[0] for text in mesh.warnings] == ["1 of 5 faces left out"] * 2
+    assert caplog.text.count("left out") == 2 and "no area" in caplog.text and "same corners" in caplog.text
+    labels = np.arange(5)
+    assert np.array_equal(np.array(faces)[labels[mesh.source_faces]], mesh.faces)
+    again = pickle.loads(pickle.dumps(mesh))
+    assert again.source_faces.tolist() == [0, 2, 4] and np.array_equal(again.faces, mesh.faces)
+    assert mesh.with_faces([2]).source_faces.tolist() == [4]
+    with pytest.raises(s3d.UsageError, match="source_faces: 5 numbers"):
+        s3d.Mesh(corners, faces, source_faces=[1, 2])
 
 
 def test_points_of_a_data_set_know_its_labels(demo: Path) -> None:

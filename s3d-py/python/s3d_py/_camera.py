@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Union
+from typing import Any, Protocol, Union
 
 import numpy as np
 import numpy.typing as npt
@@ -74,13 +74,18 @@ class Location:
         return f"Location({self.uuid[:8]}… at {x:.2f}, {y:.2f}, {z:.2f})"
 
 
-PoseLike = Union[Location, npt.ArrayLike]
-"""`T_world_cam` as 4 × 4; a `Location`; or the position (3,) of a level camera that looks along +Y."""
+class Posed(Protocol):
+    """Anything with a pose: a `Location`, a `Camera`, a `CameraPose`, an image of a data set."""
+
+    @property
+    def T_world_cam(self) -> Matrix: ...
+
+
+PoseLike = Union[Posed, npt.ArrayLike]
+"""`T_world_cam` as 4 × 4; anything that has it, such as a `Location`; or the position (3,) of a level camera that looks along +Y."""
 
 
 def pose_of(pose: PoseLike) -> Matrix:
     """Returns `T_world_cam` of a pose in any of its forms."""
-    if isinstance(pose, Location):
-        return pose.T_world_cam
-    array: npt.NDArray[Any] = np.asarray(pose)
-    return level(array.tolist()) if array.shape == (3,) else matrix("T_world_cam", pose, (4, 4))
+    values: Any = getattr(pose, "T_world_cam", pose)
+    return level(values) if np.shape(values) == (3,) else matrix("T_world_cam", values, (4, 4))

@@ -47,6 +47,7 @@ class Mesh:
         texture: npt.ArrayLike | Sequence[npt.ArrayLike] | None = None,
         texture_of_face: npt.ArrayLike | None = None,
         vertex_normals: npt.ArrayLike | None = None,
+        source_faces: npt.ArrayLike | None = None,
     ) -> None:
         """Makes a mesh from arrays, which are copied.
 
@@ -59,6 +60,9 @@ class Mesh:
         - `texture`: the image, (H, W, 3) or (H, W, 4) of numbers like colours, or a list of images.
         - `texture_of_face`: (F,), the index of each face's image in a list, −1 for none.
         - `vertex_normals`: (V, 3), unit vectors, for smooth normals.
+        - `source_faces`: (F,), the numbers that `Mesh.source_faces` has; 0 to F − 1 if None.
+
+        Faces that are left out are told in `Mesh.warnings`, and logged.
 
         Raises `MeshError` for an index out of range, a corner that is not finite, or a mesh without any face
         that has an area; `UsageError` for an array of another shape.
@@ -78,6 +82,9 @@ class Mesh:
         images = [image_of("texture", image) for image in textures]
         if vertex_colors is not None and face_colors is not None:
             raise UsageError("vertex_colors, face_colors: give one of them")
+        sources = None if source_faces is None else whole("source_faces", source_faces, np.uint32)
+        if sources is not None and sources.shape != (len(corners),):
+            raise UsageError(f"source_faces: {len(corners)} numbers, not an array of shape {sources.shape}")
         uvs, face_uv = (None, None) if uv is None else _corner_uv(uv, positions, corners)
         self._native = NativeMesh.from_arrays(
             positions,
@@ -91,9 +98,12 @@ class Mesh:
             if texture_of_face is None
             else whole("texture_of_face", texture_of_face, np.int32).view(np.uint32),
             normals,
+            sources,
         )
+        for text in self.warnings:
+            log.warning("mesh in memory: %s", text)
         if normals is not None:
-            given = (vertices, faces, vertex_colors, face_colors, uv, texture, texture_of_face, normals)
+            given = (vertices, faces, vertex_colors, face_colors, uv, texture, texture_of_face, normals, source_faces)
             self._made = _of_arrays, given
 
     @classmethod
@@ -113,7 +123,7 @@ class Mesh:
         of_face = None if textures is None else self.texture_of_face
         face_colors = None if self.vertex_colors is not None else self.face_colors
         columns = (self.vertices, self.faces, self.vertex_colors, face_colors, uv, textures, of_face, None)
-        return _of_arrays, columns
+        return _of_arrays, (*columns, self.source_faces)
 
     @property
     def vertices(self) -> npt.NDArray[np.float32]:
@@ -172,8 +182,9 @@ class Mesh:
 
     @property
     def source_faces(self) -> npt.NDArray[np.uint32]:
-        """(F,), the number of each face in its file, from 0: faces are left out, and polygons cut, when a file is
-        read. So `labels[mesh.source_faces]` are labels of `faces`. (0,) for a mesh from arrays.
+        """(F,), the number of each face in its file or its arrays, from 0: faces without an area and repeated ones
+        are left out, and polygons of a file are cut. So `labels[mesh.source_faces]` are labels of `faces`. Meshes made
+        by `cropped`, `with_faces` and `transformed` keep the numbers; `merged` counts on.
         """
         return self._native.source_faces
 
@@ -208,7 +219,7 @@ class Mesh:
 
     @property
     def warnings(self) -> list[str]:
-        """Repairs, omissions and replacements made when the file was read, a sentence each."""
+        """Repairs, omissions and replacements made when the mesh was read or made, a sentence each."""
         return self._native.warnings
 
     @property
@@ -354,11 +365,19 @@ def _read_again(path: str, up: str | None, units: str | None, near: bool) -> Mes
 
 
 def _of_arrays(
-    vertices: Any, faces: Any, vertex_colors: Any, face_colors: Any, uv: Any, texture: Any, of_face: Any, normals: Any
+    vertices: Any,
+    faces: Any,
+    vertex_colors: Any,
+    face_colors: Any,
+    uv: Any,
+    texture: Any,
+    of_face: Any,
+    normals: Any,
+    source_faces: Any,
 ) -> Mesh:
     colors = {"vertex_colors": vertex_colors, "face_colors": face_colors}
     looks = {"uv": uv, "texture": texture, "texture_of_face": of_face, "vertex_normals": normals}
-    return Mesh(vertices, faces, **colors, **looks)
+    return Mesh(vertices, faces, **colors, **looks, source_faces=source_faces)
 
 
 def as_mesh(mesh: MeshLike, *, up: str = "z") -> Mesh:

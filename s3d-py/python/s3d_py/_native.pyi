@@ -135,6 +135,7 @@ class Mesh:
         textures: Sequence[_U8],
         texture_of_face: _U32 | None,
         vertex_normals: _F32 | None,
+        source_faces: _U32 | None,
     ) -> Mesh: ...
     @property
     def vertices(self) -> _F32: ...
@@ -189,6 +190,7 @@ class Scene:
         size: tuple[int, int],
         request: tuple[Sequence[str], bool, int, bool],
         threads: int | None,
+        sink: Sink,
     ) -> dict[str, npt.NDArray[Any]]: ...
     def cast(self, origins: _F64, directions: _F64, threads: int | None) -> tuple[_F64, _I32]: ...
     def occluded(

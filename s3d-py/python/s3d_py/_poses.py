@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _native
-from ._camera import Matrix
+from ._camera import Matrix, matrix, pose_of
 from ._errors import UsageError
 from ._files import replaced
 from ._progress import Sink
@@ -53,9 +53,10 @@ def save_poses(path: str | PathLike[str], poses: Iterable[CameraPose]) -> None:
     nerfstudio's `transforms.json`, `.txt` a trajectory of TUM (names are time stamps, or numbers from 0), and a
     name without an ending the folder of a COLMAP model in text.
 
-    Raises `UsageError` for cameras without what the form needs: sizes and intrinsics, except for `.txt`.
+    Raises `UsageError` for cameras without what the form needs: sizes and intrinsics, except for `.txt`; and for a
+    matrix that is no pose.
     """
-    target, cameras = Path(path), list(poses)
+    target, cameras = Path(path), [_checked(camera) for camera in poses]
     if not cameras:
         raise UsageError("poses: there are none")
     if target.suffix == ".txt":
@@ -75,6 +76,19 @@ def save_poses(path: str | PathLike[str], poses: Iterable[CameraPose]) -> None:
 
 def _pair(size: Sequence[int] | None) -> tuple[int, int] | None:
     return None if size is None else (size[0], size[1])
+
+
+def _checked(camera: CameraPose) -> CameraPose:
+    """Returns a camera with arrays, if its matrix turns and moves, and does nothing else."""
+    if not isinstance(camera, CameraPose):
+        raise UsageError(f"poses: some CameraPose, with names, and not {type(camera).__name__}")
+    T = pose_of(camera.T_world_cam)
+    turn = T[:3, :3]
+    is_turn = np.allclose(turn.T @ turn, np.eye(3), atol=1e-3) and np.linalg.det(turn) > 0
+    if not np.isfinite(T).all() or not is_turn or not np.allclose(T[3], [0, 0, 0, 1]):
+        raise UsageError(f"{camera.name}: T_world_cam must turn and move, and neither scale, mirror nor shear: {T.tolist()}")
+    K = None if camera.K is None else matrix("K", camera.K, (3, 3))
+    return CameraPose(camera.name, T, K, camera.size, camera.distortion)
 
 
 def _tum_line(place: int, camera: CameraPose) -> str:

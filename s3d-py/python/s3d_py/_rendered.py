@@ -102,7 +102,7 @@ class FreeSpace:
 
 
 def walk(
-    scene: Scene,
+    scene: Scene | MeshLike,
     frames: int,
     *,
     speed: float = 1.0,
@@ -121,7 +121,9 @@ def walk(
     Raises `InputError` if there is no way of a metre, and says what was found.
     """
     count = number("frames", frames, 1)
-    poses = scene._native.walk(count, speed, rate, height, number("seed", seed, 0), threads, sink(progress))
+    intrinsics((1, 1), fov)
+    native = (scene if isinstance(scene, Scene) else Scene(scene))._native
+    poses = native.walk(count, speed, rate, height, number("seed", seed, 0), threads, sink(progress))
     return [Camera(np.array(pose), fov) for pose in poses]
 
 
@@ -206,8 +208,9 @@ class RenderedViews:
         Raises `UsageError` for arguments that do not fit together.
         """
         self.source = source if isinstance(source, (DataSet, Scene)) else Scene(source)
-        if not callable(sampler) and not isinstance(sampler, str) and not len(sampler):
-            raise UsageError("sampler: there are no cameras")
+        if not callable(sampler) and not isinstance(sampler, str):
+            if not len(sampler) or not all(isinstance(camera, Camera) for camera in sampler):
+                raise UsageError("sampler: cameras, each a Camera(T_world_cam, fov)")
         usual = 10_000 if callable(sampler) or isinstance(sampler, str) else len(sampler)
         self.length = number("length", usual if length is None else length, 1)
         self.seed = number("seed", seed, 0)

@@ -29,6 +29,8 @@ class Picture:
     """An image in colours, which notebooks show."""
 
     def __init__(self, pixels: npt.NDArray[np.uint8]) -> None:
+        if pixels.dtype != np.uint8 or pixels.ndim != 3 or pixels.shape[2] != 3:
+            raise UsageError(f"pixels: uint8 (H, W, 3), not {pixels.dtype} {pixels.shape}")
         self.pixels = pixels
 
     pixels: npt.NDArray[np.uint8]
@@ -36,17 +38,24 @@ class Picture:
 
     def beside(self, *others: Picture) -> Picture:
         """Returns pictures of the same height in a row, this one first."""
+        if any(len(other.pixels) != len(self.pixels) for other in others):
+            raise UsageError(f"pictures of one height, not {[len(p.pixels) for p in (self, *others)]}")
         return Picture(np.concatenate([self.pixels, *(other.pixels for other in others)], axis=1))
 
     def under(self, other: Picture, share: float = 0.5) -> Picture:
         """Returns a picture of the same size in which another one lies over this one, by a share of 0 to 1. Where
         the other is black, this one stays.
         """
+        if other.pixels.shape != self.pixels.shape or not 0.0 <= share <= 1.0:
+            sizes = f"{self.pixels.shape} and {other.pixels.shape}"
+            raise UsageError(f"share={share}: 0 to 1, of pictures of one size, here {sizes}")
         mixed = np.rint((1.0 - share) * self.pixels + share * other.pixels).astype(np.uint8)
         return Picture(np.where(other.pixels.any(axis=2, keepdims=True), mixed, self.pixels))
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes it as a PNG file."""
+        """Writes it as a PNG file, whose name ends so."""
+        if Path(path).suffix.lower() != ".png":
+            raise UsageError(f"{path}: pictures are written as .png")
         with replaced(Path(path)) as file:
             file.write(self._repr_png_())
 
@@ -166,9 +175,10 @@ def _request(
     words = list(dict.fromkeys([modalities] if isinstance(modalities, str) else modalities))
     if not words:
         raise UsageError(f"modalities: name some of {', '.join(MODALITIES)}")
-    width, height = size
-    if not all(isinstance(side, (int, np.integer)) and side > 0 for side in size):
-        raise UsageError(f"size=({width}, {height}): width and height must be whole numbers from 1")
+    sides = tuple(size) if isinstance(size, (Sequence, np.ndarray)) else ()
+    if len(sides) != 2 or not all(isinstance(side, (int, np.integer)) and side > 0 for side in sides):
+        raise UsageError(f"size={size}: width and height must be whole numbers from 1")
+    width, height = sides
     samples = number("rgb_samples", rgb_samples, 1, 64)
     return (words, bool(smooth_normals), samples, stored), (int(width), int(height))
 
@@ -306,6 +316,7 @@ class Scene:
         rgb_samples: int = 1,
         smooth_normals: bool = False,
         threads: int | None = None,
+        progress: Progress = None,
     ) -> dict[str, npt.NDArray[Any]]:
         """Renders N cameras of one size at once: for many small images, as simulators and samplers want them. Returns
         an array by modality, (N, H, W) or (N, H, W, 3), with the pixels of `render`. `K` is (3, 3), or (N, 3, 3).
@@ -314,10 +325,12 @@ class Scene:
         """
         matrices = [pose_of(pose).tolist() for pose in poses]
         ks = [matrix("K", k, (3, 3)).tolist() for k in (K if np.ndim(K) == 3 else [K])]  # type: ignore[union-attr]
-        if not matrices or len(ks) not in (1, len(matrices)):
+        if not matrices:
+            raise UsageError("poses: there are none")
+        if len(ks) not in (1, len(matrices)):
             raise UsageError(f"{len(matrices)} poses and {len(ks)} K: one K for all poses, or one for each")
         request, (width, height) = _request(size, modalities, rgb_samples, smooth_normals, False)
-        made = self._native.render_stack(ks, matrices, (width, height), request, threads)
+        made = self._native.render_stack(ks, matrices, (width, height), request, threads, sink(progress))
         return {word: made[word] for word in request[0]}
 
     def cast(

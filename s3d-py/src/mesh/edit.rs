@@ -20,7 +20,9 @@ pub(crate) fn merged(py: Python<'_>, meshes: Vec<Bound<'_, Mesh>>) -> PyResult<M
         let parts = files
             .iter()
             .map(|file| MeshParts { face_tags: Vec::new(), ..file.mesh.parts().clone() });
-        TriMesh::new(MeshParts::merge(parts))
+        let mut parts = MeshParts::merge(parts);
+        parts.face_tags = (0..parts.faces.len() as u32).collect();
+        TriMesh::new(parts)
     })
 }
 
@@ -37,7 +39,8 @@ pub(crate) fn transformed(py: Python<'_>, mesh: &Bound<'_, Mesh>, matrix: [[f64;
     let file = Arc::clone(&mesh.get().file);
     made(py, || {
         let transform = DAffine3::from_mat3_translation(linear, column(3));
-        file.mesh.clone().transformed(&transform)
+        let parts = MeshParts { face_tags: file.source_faces.clone(), ..file.mesh.parts().clone() };
+        TriMesh::new(parts)?.transformed(&transform)
     })
 }
 
@@ -49,7 +52,15 @@ pub(crate) fn with_faces(py: Python<'_>, mesh: &Bound<'_, Mesh>, faces: Vec<u32>
     if let Some(face) = faces.iter().find(|face| **face as usize >= count) {
         return Err(usage(format!("faces: {face}, and there are {count}")));
     }
-    made(py, || file.mesh.with_faces(&faces))
+    made(py, || {
+        let mut parts = file.mesh.with_faces(&faces)?.into_parts();
+        parts.face_tags = faces
+            .iter()
+            .filter_map(|&face| file.source_faces.get(face as usize))
+            .copied()
+            .collect();
+        TriMesh::new(parts)
+    })
 }
 
 /// Writes a mesh as a GLB file with its textures, or as a PLY file with the colours of its vertices.
@@ -76,10 +87,12 @@ pub(crate) fn save_mesh(py: Python<'_>, mesh: &Bound<'_, Mesh>, path: PathBuf) -
     written.map(drop).map_err(|e| exception(&Error::from(e)))
 }
 
-/// Makes a mesh in memory.
+/// Makes a mesh in memory. Its face tags are the numbers of its faces in their source.
 fn made(py: Python<'_>, make: impl FnOnce() -> Result<TriMesh, MeshError> + Send) -> PyResult<Mesh> {
     let mesh = detached(py, None, make)?;
-    let mesh =
+    let mut mesh =
         mesh.map_err(|source| exception(&FileError::Mesh { path: IN_MEMORY.into(), source }.into()))?;
-    Ok(Mesh { file: Arc::new(MeshFile::in_memory(IN_MEMORY, mesh)) })
+    let source_faces = mesh.take_face_tags();
+    let file = MeshFile { source_faces, ..MeshFile::in_memory(IN_MEMORY, mesh) };
+    Ok(Mesh { file: Arc::new(file) })
 }

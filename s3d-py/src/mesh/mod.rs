@@ -76,8 +76,14 @@ impl Mesh {
         textures: Vec<PyReadonlyArray3<'_, u8>>,
         texture_of_face: Option<PyReadonlyArray1<'_, u32>>,
         vertex_normals: Option<PyReadonlyArray2<'_, f32>>,
+        source_faces: Option<PyReadonlyArray1<'_, u32>>,
     ) -> PyResult<Self> {
         let faces = arrays::from_rows::<u32, 3>("faces", &faces)?;
+        let count = faces.len();
+        let face_tags = match source_faces {
+            Some(numbers) => numbers.to_vec().map_err(|e| usage(format!("source_faces: {e}")))?,
+            None => (0..count as u32).collect(),
+        };
         let normals = vertex_normals
             .map(|n| arrays::points("vertex_normals", &n))
             .transpose()?;
@@ -115,13 +121,25 @@ impl Mesh {
             face_materials,
             textures,
             faces,
-            ..MeshParts::default()
+            face_tags,
         };
 
         let made = detached(py, None, || TriMesh::new(parts).map(TriMesh::without_repeated_faces))?;
-        let (mesh, repeated) =
+        let (mut mesh, repeated) =
             made.map_err(|source| exception(&FileError::Mesh { path: IN_MEMORY.into(), source }.into()))?;
+        let source_faces = mesh.take_face_tags();
         let mut file = MeshFile::in_memory(IN_MEMORY, mesh);
+        for (left_out, why) in [
+            (count - source_faces.len() - repeated, "they have no area"),
+            (repeated, "earlier faces have the same corners"),
+        ] {
+            if left_out > 0 {
+                let text =
+                    format!("{left_out} of {count} faces left out: {why}; source_faces numbers the others");
+                file.warnings.push(text);
+            }
+        }
+        file.source_faces = source_faces;
         file.repeated_faces = repeated;
         Ok(Self { file: Arc::new(file) })
     }

@@ -65,7 +65,7 @@ impl WalkOptions {
         let [low, high] = HEIGHTS_M;
         let refuse = |option, range| Err(UsageError::OutOfRange { option, range }.into());
         if self.frames == 0 || self.frames > MOST_FRAMES {
-            return refuse("trajectory", format!("1 to {MOST_FRAMES} images"));
+            return refuse("trajectory", format!("1 to {MOST_FRAMES} images, at the rate"));
         }
         if !(self.rate > 0.0 && self.rate <= MOST_RATE) {
             return refuse("rate", format!("above 0, at most {MOST_RATE} a second"));
@@ -108,10 +108,17 @@ pub fn walk(scene: &Scene<'_>, options: &WalkOptions, ctx: &Context) -> Result<V
     let mut route = Route::begin(&inside, &around, options)?;
     let progress = ctx.progress("walking", "poses", options.frames as u64);
 
+    let mut told = 0;
+    let mut tell = |walked_m: f64| {
+        let done = ((walked_m / LONGER / options.step_m()) as u64).clamp(told, options.frames as u64);
+        progress.add(done - told);
+        told = done;
+    };
+
     let needed_m = options.frames as f64 * options.step_m();
     let mut length_m = LONGER * needed_m + LONGER_M;
     let curve = loop {
-        route.extend_to(length_m, ctx)?;
+        route.extend_to(length_m, ctx, &mut tell)?;
         let curve = Curve::smooth(route.eyes(), options.height_m, &around);
         if curve.length_m() >= needed_m {
             break curve;
@@ -119,9 +126,8 @@ pub fn walk(scene: &Scene<'_>, options: &WalkOptions, ctx: &Context) -> Result<V
         length_m *= LONGER;
     };
 
-    let poses = curve.poses(options.frames, options.step_m(), options.rate);
-    progress.add(poses.len() as u64);
-    Ok(poses)
+    tell(f64::INFINITY);
+    Ok(curve.poses(options.frames, options.step_m(), options.rate))
 }
 
 /// Returns the error of a building in which nobody can walk.

@@ -74,12 +74,18 @@ impl<'a> Route<'a> {
         Ok(route)
     }
 
-    /// Goes on from place to place until the walk has a length.
+    /// Goes on from place to place until the walk has a length. After each leg, `tell` is told the metres so
+    /// far.
     ///
     /// # Errors
     /// [`Error::Input`](crate::Error::Input) if no other place can be reached;
     /// [`Error::Cancelled`](crate::Error::Cancelled).
-    pub(super) fn extend_to(&mut self, length_m: f64, ctx: &Context) -> Result<()> {
+    pub(super) fn extend_to(
+        &mut self,
+        length_m: f64,
+        ctx: &Context,
+        mut tell: impl FnMut(f64),
+    ) -> Result<()> {
         while self.length_m < length_m {
             ctx.check()?;
             let leg = match self.way_to_unvisited() {
@@ -101,6 +107,7 @@ impl<'a> Route<'a> {
             self.length_m += self.metres(&leg);
             leg.iter().for_each(|&foot| self.visit(foot));
             self.feet.extend(leg);
+            tell(self.length_m);
         }
         Ok(())
     }
