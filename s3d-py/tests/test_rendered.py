@@ -193,9 +193,9 @@ def test_a_walk_is_smooth_and_goes_through_doors(ds: s3d.DataSet) -> None:
     with pytest.raises(s3d.UsageError, match="fov=0"):
         s3d.walk(scene, 9, fov=0)
     of_path = s3d.walk(ds.root / "scan" / "rgb.obj", 9, seed=1)
-    assert np.allclose(of_path[8].T_world_cam, cameras[8].T_world_cam, atol=1e-6)
+    assert np.allclose(of_path[5].T_world_cam[:3, 3], eyes[5], atol=1e-6)
     with pytest.raises(s3d.UsageError, match="each a Camera"):
-        s3d.RenderedViews(ds, sampler=[eyes[0]])  # type: ignore[list-item]
+        s3d.RenderedViews(ds, sampler=[eyes[0]])
 
     views = s3d.RenderedViews(ds, size=(32, 32), modalities=["depth"], sampler=cameras[:5])
     assert len(views) == 5 and np.array_equal(views[4]["T_world_cam"], cameras[4].T_world_cam.astype(np.float32))

@@ -231,11 +231,12 @@ def _interrupt() -> None:
 def test_a_stack_has_the_pixels_of_single_images(scene: s3d.Scene) -> None:
     poses = [s3d.look_at((2, 1.5, 1.2), (3 * np.cos(a), 3 * np.sin(a), 1.0)) for a in np.linspace(0, 6, 21)]
     ks = [K * [[f, 1, 1], [1, f, 1], [1, 1, 1]] for f in np.linspace(0.5, 1.5, len(poses))]
-    for threads, intrinsics in itertools.product((1, 3), (K, ks)):
-        stack = scene.render_stack(poses, intrinsics, (64, 48), modalities=ALL, rgb_samples=4, threads=threads)
+    for threads, several in itertools.product((1, 3), (False, True)):
+        given = np.array(ks) if several else K
+        stack = scene.render_stack(poses, given, (64, 48), modalities=ALL, rgb_samples=4, threads=threads)
         assert list(stack) == list(ALL)
         for i, pose in enumerate(poses):
-            k = ks[i] if intrinsics is ks else K
+            k = ks[i] if several else K
             alone = scene.render(k, pose, (64, 48), modalities=ALL, rgb_samples=4)
             for name in ALL:
                 assert stack[name].dtype == alone[name].dtype and stack[name].shape[0] == len(poses)
