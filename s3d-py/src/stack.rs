@@ -15,7 +15,8 @@ use s3d_render::Caster;
 /// So many images are made by one thread, which keeps its memory for them.
 const IMAGES: usize = 8;
 
-/// Renders cameras of one size. Returns arrays N × height × width, or N × height × width × 3, by modality.
+/// Renders cameras of one size. Returns an array for each modality: N × height × width, or with 3 channels
+/// more.
 pub(crate) fn render_stack<'py>(
     py: Python<'py>,
     scene: &Scene,
