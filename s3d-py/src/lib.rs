@@ -18,7 +18,6 @@ mod points;
 mod poses;
 mod scene;
 mod segments;
-mod stack;
 mod work;
 
 /// `s3d_py._native`.

@@ -4,6 +4,7 @@
 pub(crate) mod free_space;
 mod walk;
 
+pub(crate) use walk::MOST_RATE;
 pub use walk::{WalkOptions, walk};
 
 use crate::context::Context;

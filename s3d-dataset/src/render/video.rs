@@ -1,7 +1,8 @@
 //! Makes a video of images by ffmpeg, a program that may be installed beside this one.
 
 use crate::context::Context;
-use crate::error::{Result, UsageError};
+use crate::error::{InputError, Result, UsageError};
+use crate::place::MOST_RATE;
 use s3d_io::Error as FileError;
 use s3d_io::dataset::Domain;
 use s3d_io::fs::read_file;
@@ -18,15 +19,19 @@ const THREADS: &str = "4";
 /// Checks that a video can be made: that there are colour images, and ffmpeg.
 ///
 /// # Errors
-/// [`Error::Usage`](crate::Error::Usage) if not.
+/// [`Error::Usage`](crate::Error::Usage) if the rate is out of range, or there are no colour images;
+/// [`Error::Input`](crate::Error::Input) if there is no ffmpeg.
 pub(super) fn check(rate: f64, modalities: &[Domain]) -> Result<()> {
-    let refuse = |why| Err(UsageError::InvalidValue { option: "video", value: rate.to_string(), why }.into());
-    if !(rate > 0.0 && rate <= 1000.0) {
-        return refuse("images a second: above 0, at most 1000".to_owned());
+    if !(rate > 0.0 && rate <= MOST_RATE) {
+        let range = format!("above 0, at most {MOST_RATE} a second");
+        return Err(UsageError::OutOfRange { option: "rate", range }.into());
     }
     if !modalities.contains(&Domain::Rgb) {
-        return refuse("a video is made of the images rgb, which are not asked for".to_owned());
+        let value = modalities.iter().map(ToString::to_string).collect::<Vec<_>>().join(",");
+        let why = "a video is made of the images rgb".to_owned();
+        return Err(UsageError::InvalidValue { option: "modalities", value, why }.into());
     }
+    let refuse = |why| Err(InputError::Unfit { path: "ffmpeg".into(), why }.into());
     match program()
         .arg("-version")
         .stdout(Stdio::null())
@@ -34,8 +39,8 @@ pub(super) fn check(rate: f64, modalities: &[Domain]) -> Result<()> {
         .status()
     {
         Ok(ended) if ended.success() => Ok(()),
-        Ok(ended) => refuse(format!("ffmpeg does not run ({ended}): mend it, or make images alone")),
-        Err(e) => refuse(format!("ffmpeg does not start ({e}): install it, or make images alone")),
+        Ok(ended) => refuse(format!("does not run ({ended}): mend it, or make images without a video")),
+        Err(e) => refuse(format!("does not start ({e}): install it, or make images without a video")),
     }
 }
 

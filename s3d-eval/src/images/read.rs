@@ -70,7 +70,9 @@ impl fmt::Display for Holds {
         match self {
             Self::Floats(1) | Self::Numbers => f.write_str("H × W"),
             Self::Floats(n) => write!(f, "H × W × {n} or {n} × H × W"),
-            Self::Classes(n) => write!(f, "H × W whole numbers, or of H × W × {n} or {n} × H × W floats"),
+            Self::Classes(n) => {
+                write!(f, "H × W whole numbers, or of H × W × {n} or {n} × H × W floats")
+            }
         }
     }
 }

@@ -69,7 +69,7 @@ pub struct MeshFile {
     pub labels: Option<MeshLabels>,
     /// For each face its number in its file, from 0. Triangles that were cut from a polygon share the number
     /// of the polygon. PLY and OBJ count their faces, those with fewer than three corners not in OBJ. glTF
-    /// counts triangles in the order of the nodes of the scene. Empty for a mesh that no file holds.
+    /// counts triangles in the order of the nodes of the scene. Empty if nothing numbers them.
     pub source_faces: Vec<u32>,
     /// The files that the mesh comes from, and where each begins in the mesh.
     pub sources: Vec<MeshSource>,

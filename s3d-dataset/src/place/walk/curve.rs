@@ -105,7 +105,7 @@ impl Curve {
         for i in 0..count {
             let here_m = i as f64 * step_m;
             let ahead = self.at(here_m + AHEAD_M) - self.at(here_m - AHEAD_M);
-            if ahead.x.hypot(ahead.y) > 0.1 * AHEAD_M {
+            if libm::hypot(ahead.x, ahead.y) > 0.1 * AHEAD_M {
                 // A level pose looks along +Y at first. Turns are counted on, so that means make sense.
                 let seen = libm::atan2(ahead.y, ahead.x) - FRAC_PI_2;
                 yaw += (seen - yaw + PI).rem_euclid(TAU) - PI;

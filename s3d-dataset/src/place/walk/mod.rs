@@ -22,8 +22,8 @@ const HEIGHTS_M: [f64; 2] = [0.3, 2.5];
 const MOST_FRAMES: usize = 1_000_000;
 const MOST_METRES: f64 = 100_000.0;
 
-/// The most poses a second.
-const MOST_RATE: f64 = 1000.0;
+/// The most poses a second, or images of a video.
+pub(crate) const MOST_RATE: f64 = 1000.0;
 
 /// Smoothing shortens a route, so it is found longer by this share and length, and longer again if needed.
 const LONGER: f64 = 1.15;

@@ -31,8 +31,8 @@ const DSINE: [&str; 3] = [
 const OMNIDATA: [&str; 3] = [
     "Images are evaluated at their own size, at pixels that show a surface.",
     "Scores are computed for each image: the mean and the median (of two middle values their mean) of its \
-     angles in degrees, and the share (0 to 1) of angles of at most (≤) 11.25, 22.5 and 30°. The table has \
-     their mean over images.",
+     angles in degrees, and the share (0 to 1) of angles of at most (≤) 11.25, 22.5 and 30°. The table \
+     has their mean over images.",
     "As in Omnidata's evaluation_metrics.py (commit f69ff3ae).",
 ];
 

@@ -1,7 +1,7 @@
 //! Many images of one size, in one array for each modality.
 
+use super::{Request, Scene, bytes_of};
 use crate::error::exception;
-use crate::scene::{Request, Scene, bytes_of};
 use crate::work::watched;
 use bytemuck::cast_slice_mut;
 use numpy::{PyArray1, PyArrayMethods};
@@ -17,7 +17,7 @@ const IMAGES: usize = 8;
 
 /// Renders cameras of one size. Returns an array for each modality: N × height × width, or with 3 channels
 /// more.
-pub(crate) fn render_stack<'py>(
+pub(super) fn render_stack<'py>(
     py: Python<'py>,
     scene: &Scene,
     cameras: &[Camera],

@@ -1,9 +1,10 @@
 //! `_native.Scene`: what cameras and rays see of a mesh.
 
+mod stack;
+
 use crate::arrays;
 use crate::error::{exception, usage};
 use crate::mesh::Mesh;
-use crate::stack;
 use crate::work::{detached, watched};
 use bytemuck::cast_slice;
 use half::slice::HalfFloatSliceExt;
@@ -56,14 +57,14 @@ pub(crate) struct Scene {
 /// The request for a view: modalities, smooth normals, colour samples of a pixel, and whether pixels are as
 /// the files of a data set store them, instead of numbers in metres.
 #[derive(FromPyObject)]
-pub(crate) struct Request(Vec<String>, bool, u32, bool);
+struct Request(Vec<String>, bool, u32, bool);
 
 /// A camera: K, or none for a panorama, the pose, and width and height.
 #[derive(FromPyObject)]
 struct View(Option<[[f64; 3]; 3]>, [[f64; 4]; 4], [u32; 2]);
 
 /// An image of a view.
-pub(crate) enum Modality {
+enum Modality {
     Rgb(Raster<[u8; 3]>),
     Depth(Raster<f32>),
     StoredDepth(Raster<u16>),
@@ -333,7 +334,7 @@ fn few_or_many<T: Send>(
 const HIT_BYTES: f64 = 8.0;
 
 /// The bytes of a pixel of an image, at most.
-pub(crate) fn bytes_of(modality: &str) -> f64 {
+fn bytes_of(modality: &str) -> f64 {
     match modality {
         "rgb" => 3.0,
         "depth" | "face" => 4.0,
@@ -343,7 +344,7 @@ pub(crate) fn bytes_of(modality: &str) -> f64 {
 
 impl Request {
     /// Returns the modalities, if all of them are known.
-    pub(crate) fn modalities(&self) -> PyResult<&[String]> {
+    fn modalities(&self) -> PyResult<&[String]> {
         let Self(modalities, _, rgb_samples, ..) = self;
         if let Some(word) = modalities.iter().find(|word| !MODALITIES.contains(&word.as_str())) {
             return Err(usage(format!("modalities: {word:?} is none of {}", MODALITIES.join(", "))));
@@ -356,7 +357,7 @@ impl Request {
 }
 
 impl Scene {
-    pub(crate) fn tree(&self) -> &Tree<'_> {
+    fn tree(&self) -> &Tree<'_> {
         self.cell.borrow_dependent()
     }
 
@@ -369,7 +370,7 @@ impl Scene {
     }
 
     /// Makes the images that are asked for, and hands each on. Takes from the hits what becomes an image.
-    pub(crate) fn draw_all(
+    fn draw_all(
         &self,
         hits: &mut Hits,
         camera: &Camera,
@@ -428,7 +429,7 @@ impl Scene {
 
 impl Modality {
     /// Returns the bytes of all pixels.
-    pub(crate) fn bytes(&self) -> &[u8] {
+    fn bytes(&self) -> &[u8] {
         match self {
             Self::Rgb(image) | Self::StoredNormal(image) => image.pixels().as_flattened(),
             Self::Depth(image) => cast_slice(image.pixels()),
