@@ -97,33 +97,39 @@ impl DisjointSets {
 /// # Panics
 /// If an edge has a node without a size.
 pub fn segment_graph(
-    mut sizes: Vec<f64>,
-    edges: impl Iterator<Item = ([u32; 2], f32)> + Clone,
+    sizes: Vec<f64>,
+    edges: impl Iterator<Item = ([u32; 2], f32)>,
     scale: f64,
     smallest: f64,
 ) -> DisjointSets {
     let mut sets = DisjointSets::new(sizes.len());
-    // The largest difference that each set allows to a neighbour.
-    let mut allowed: Vec<f64> = sizes.iter().map(|size| scale / size).collect();
-    for (nodes, difference) in edges.clone() {
+    // The size of each set, and the largest difference that it allows to a neighbour.
+    let mut segments: Vec<[f64; 2]> = sizes.into_iter().map(|size| [size, scale / size]).collect();
+    let mut between = Vec::new();
+    for (nodes, difference) in edges {
         let [a, b] = nodes.map(|node| sets.root(node));
         if a == b {
             continue;
         }
         let difference = f64::from(difference);
-        let (at_a, at_b) = (a as usize, b as usize);
-        if difference <= allowed[at_a] && difference <= allowed[at_b] {
-            sets.join(a, b);
-            sizes[at_a] += sizes[at_b];
-            allowed[at_a] = difference + scale / sizes[at_a];
+        let ([size, allowed], [other_size, other_allowed]) = (segments[a as usize], segments[b as usize]);
+        if difference > allowed || difference > other_allowed {
+            between.push(nodes);
+            continue;
         }
+        let (root, other) = if size < other_size { (b, a) } else { (a, b) };
+        sets.join(root, other);
+        let size = size + other_size;
+        segments[root as usize] = [size, difference + scale / size];
     }
 
-    for (nodes, _) in edges {
+    for nodes in between {
         let [a, b] = nodes.map(|node| sets.root(node));
-        if a != b && sizes[a as usize].min(sizes[b as usize]) < smallest {
-            sets.join(a, b);
-            sizes[a as usize] += sizes[b as usize];
+        let [size, other_size] = [segments[a as usize][0], segments[b as usize][0]];
+        if a != b && size.min(other_size) < smallest {
+            let (root, other) = if size < other_size { (b, a) } else { (a, b) };
+            sets.join(root, other);
+            segments[root as usize][0] = size + other_size;
         }
     }
     sets

@@ -15,6 +15,8 @@ use s3d_dataset::verify::VerifyOptions;
 use s3d_dataset::xyz::XyzOptions;
 use s3d_eval::{EvalOptions, Folds, Protocol};
 use s3d_report::ReportOptions;
+use serde::de::DeserializeOwned;
+use serde_json::{Map, Value};
 use std::path::PathBuf;
 
 /// JSON and text.
@@ -29,6 +31,19 @@ type Verified = (Vec<Fault>, Vec<String>, u64, u64, Option<String>, String);
 /// What Python reads as JSON.
 pub(crate) fn json(value: &impl serde::Serialize) -> PyResult<String> {
     serde_json::to_string(value).map_err(|e| fault(e.to_string()))
+}
+
+/// Reads options from JSON. An error names the option that does not fit.
+pub(crate) fn options<T: DeserializeOwned>(text: &str) -> PyResult<T> {
+    serde_json::from_str(text).map_err(|error| {
+        let given: Map<String, Value> = serde_json::from_str(text).unwrap_or_default();
+        let fault = given.into_iter().find_map(|(name, value)| {
+            let alone = Map::from_iter([(name.clone(), value.clone())]);
+            let error = T::deserialize(Value::Object(alone)).err()?;
+            Some(format!("{name}={value}: {error}"))
+        });
+        usage(fault.unwrap_or_else(|| error.to_string()))
+    })
 }
 
 /// What a scene, a mesh, or a data set holds, as text.

@@ -54,7 +54,7 @@ pub(crate) fn export(
     threads: Option<usize>,
     sink: Py<PyAny>,
 ) -> PyResult<Option<String>> {
-    let mut options: ExportOptions = serde_json::from_str(options).map_err(|e| usage(e.to_string()))?;
+    let mut options: ExportOptions = crate::calls::options(options)?;
 
     let conditions = Condition::ALL.map(|condition| condition.to_string()).join(", ");
     options.allow = allow

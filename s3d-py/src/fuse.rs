@@ -1,6 +1,5 @@
 //! A raw scan to a mesh.
 
-use crate::error::usage;
 use crate::work::watched;
 use pyo3::prelude::*;
 use s3d_dataset::fuse::{FuseOptions, Fused, fuse as fused};
@@ -18,7 +17,7 @@ pub(crate) fn fuse(
     threads: Option<usize>,
     sink: Py<PyAny>,
 ) -> PyResult<([usize; 4], f64)> {
-    let options: FuseOptions = serde_json::from_str(options).map_err(|e| usage(e.to_string()))?;
+    let options: FuseOptions = crate::calls::options(options)?;
     let Fused { images, fused_faces, faces, max_error_m, closed } =
         watched(py, threads, &sink, |ctx| fused(&inputs, &output, &options, overwrite, ctx))?;
     Ok(([images, fused_faces, faces, closed], max_error_m))

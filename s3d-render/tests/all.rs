@@ -7,6 +7,7 @@ mod room;
 
 mod colors;
 mod cues;
+mod cues_plain;
 mod exact;
 mod images;
 mod modalities;

@@ -11,6 +11,10 @@ import numpy.typing as npt
 from ._errors import UsageError
 
 
+MOST_SEED = 2**64 - 1
+"""The largest seed that Rust takes."""
+
+
 def rows(what: str, values: npt.ArrayLike, columns: int, kind: Any) -> npt.NDArray[Any]:
     """Returns the values as an array (n, columns) of this type, in C order."""
     try:

@@ -122,7 +122,7 @@ def export(
     up: str | None = None,
     units: str | None = None,
     to: str | None = None,
-    allow: Sequence[str] = (),
+    allow: str | Sequence[str] = (),
     overwrite: bool = False,
     threads: int | None = None,
     progress: Progress = None,
@@ -172,8 +172,9 @@ def export(
                 "locations, labels: of a single mesh; give several as Area(mesh, area, locations, labels)"
             )
         given = [_Area(area) for area in areas]
+    allowed = [allow] if isinstance(allow, str) else list(allow)
     summary = _native.export(
-        given, fspath(output), json.dumps(options), list(allow), (up, units), to, overwrite, threads, sink(progress)
+        given, fspath(output), json.dumps(options), allowed, (up, units), to, overwrite, threads, sink(progress)
     )
     return None if summary is None else json.loads(summary)
 

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _native
-from ._checks import colors_of, number, rows, whole
+from ._checks import MOST_SEED, colors_of, number, rows, whole
 from ._errors import UsageError
 from ._files import replaced
 from ._mesh import Mesh, MeshLike, as_mesh
@@ -221,7 +221,7 @@ def sample(
     native = as_mesh(mesh)._native
     if points is not None:
         points = number("points", points, 0)
-    seed = number("seed", seed, 0)
+    seed = number("seed", seed, 0, MOST_SEED)
     xyz, rgb, face = _native.sample(native, points_per_m2, points, seed, threads, sink(progress))
     return PointCloud(xyz, rgb, face.view(np.int32))
 

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import ctypes
 import importlib
+import multiprocessing
+import multiprocessing.context
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -12,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ._camera import Matrix, PoseLike, intrinsics, pose_of
-from ._checks import number, whole
+from ._checks import MOST_SEED, number, whole
 from ._dataset import DataSet
 from ._errors import InputError, UsageError
 from ._mesh import MeshLike
@@ -123,7 +126,7 @@ def walk(
     count = number("frames", frames, 1)
     intrinsics((1, 1), fov)
     native = (scene if isinstance(scene, Scene) else Scene(scene))._native
-    poses = native.walk(count, speed, rate, height, number("seed", seed, 0), threads, sink(progress))
+    poses = native.walk(count, speed, rate, height, number("seed", seed, 0, MOST_SEED), threads, sink(progress))
     return [Camera(np.array(pose), fov) for pose in poses]
 
 
@@ -213,10 +216,11 @@ class RenderedViews:
                 raise UsageError("sampler: cameras, each a Camera(T_world_cam, fov)")
         usual = 10_000 if callable(sampler) or isinstance(sampler, str) else len(sampler)
         self.length = number("length", usual if length is None else length, 1)
-        self.seed = number("seed", seed, 0)
+        self.seed = number("seed", seed, 0, MOST_SEED)
         self.size = (number("size", size[0], 1), number("size", size[1], 1))
         self.modalities = (modalities,) if isinstance(modalities, str) else tuple(modalities)
-        self.pairs, self.augment, self.transform, self.epoch = pairs, augment, transform, 0
+        self.pairs, self.augment, self.transform = pairs, augment, transform
+        self._epoch = _Epoch(0)
         is_data = isinstance(self.source, DataSet)
         if area is not None and not is_data:
             raise UsageError("area: of a data set alone")
@@ -237,8 +241,15 @@ class RenderedViews:
         return self.length
 
     def set_epoch(self, epoch: int) -> None:
-        """Sets the epoch: each has samples of its own. Call it before the loader makes its workers."""
-        self.epoch = number("epoch", epoch, 0)
+        """Sets the epoch: each has samples of its own. Workers that are there already (`persistent_workers`)
+        follow, from the samples on that they begin after it.
+        """
+        self._epoch.set(number("epoch", epoch, 0))
+
+    @property
+    def epoch(self) -> int:
+        """The epoch whose samples are made."""
+        return self._epoch.get()
 
     def __getitem__(self, index: int) -> Any:
         if not -self.length <= index < self.length:
@@ -329,6 +340,31 @@ class RenderedViews:
     def __repr__(self) -> str:
         width, height = self.size
         return f"RenderedViews({self.length:,} of {width} × {height}: {', '.join(self.modalities)})"
+
+
+class _Epoch:
+    """A number that a process shares with those that it starts."""
+
+    def __init__(self, epoch: int) -> None:
+        self._number = multiprocessing.RawValue(ctypes.c_int64, epoch)
+
+    def get(self) -> int:
+        return int(self._number.value)
+
+    def set(self, epoch: int) -> None:
+        self._number.value = epoch
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # Shared memory goes to a process that is being started, and nowhere else.
+        if multiprocessing.context.get_spawning_popen() is None:
+            return _Epoch, (self.get(),)
+        return _shared_epoch, (self._number,)
+
+
+def _shared_epoch(of: Any) -> _Epoch:
+    epoch = _Epoch.__new__(_Epoch)
+    epoch._number = of
+    return epoch
 
 
 class RenderedStream:

@@ -343,7 +343,7 @@ class Scene:
         - `directions`: (…, 3), of any length, world metres.
 
         Only hits at t > 0 count. Rays with an infinite or zero direction hit nothing. Uses `threads` threads,
-        one a core if None.
+        one a core if None. Ctrl-C ends it.
         """
         shape, starts, ways = as_rays(origins, directions)
         t, face = self._native.cast(starts, ways, threads)
@@ -433,6 +433,8 @@ class Scene:
         Raises `InputError` if there is no such place, and says what was found: the mesh may be upside down or
         in other units.
         """
+        if apart is not None and not apart > 0:
+            raise UsageError(f"apart={apart}: must be above 0 metres")
         placed = self._native.place_cameras(see, apart, seed, threads, sink(progress))
         return [Location(uuid, np.array(pose)) for uuid, pose in placed]
 

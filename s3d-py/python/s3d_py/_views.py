@@ -15,9 +15,10 @@ import numpy.typing as npt
 
 from . import _native
 from ._camera import Matrix
-from ._checks import number, rows
+from ._checks import number
 from ._errors import UsageError
 from ._packages import for_torch
+from ._rays import as_points
 from ._scene import Picture, picture
 
 if TYPE_CHECKING:
@@ -143,12 +144,13 @@ class Image:
         return self._camera[1]
 
     def project(self, xyz: npt.ArrayLike) -> tuple[Matrix, Matrix]:
-        """Returns where the image shows points (N, 3) in world metres: pixels (N, 2), x to the right and y down,
-        the centre of the first pixel at (0.5, 0.5), which may lie outside of the image; and depths (N,) as
+        """Returns where the image shows points (…, 3) in world metres: pixels (…, 2), x to the right and y down,
+        the centre of the first pixel at (0.5, 0.5), which may lie outside of the image; and depths (…) as
         `depth` has them, metres. Pixels of points behind a view are NaN. Surfaces between are not looked at.
         """
-        points = rows("xyz", xyz, 3, np.float64)
-        return self._project(points - self.T_world_cam[:3, 3])
+        shape, points = as_points(xyz, "xyz")
+        pixels, depth = self._project(points - self.T_world_cam[:3, 3])
+        return pixels.reshape(*shape, 2), depth.reshape(shape)
 
     def _project(self, offsets: Matrix) -> tuple[Matrix, Matrix]:
         raise NotImplementedError

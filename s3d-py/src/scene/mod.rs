@@ -18,11 +18,12 @@ use s3d_geom::{Camera, NO_INDEX, Nearest, NearestFaces, NormalAxes, Pose, Raster
 use s3d_io::image::{Compression, Content, encode_rgb8};
 use s3d_io::mesh::MeshFile;
 use s3d_render::{
-    Hits, MipMaps, NO_FACE, Normals, TextureFilter, are_inside, are_rays_blocked, cast, cast_rays,
+    Hit, Hits, MipMaps, NO_FACE, Normals, TextureFilter, are_inside, are_rays_blocked, cast, cast_rays,
     correspondences, count_hits, depth_image, normal_image, normal_vectors, rgb_image, sample_edges,
     xyz_image, xyz_image_half,
 };
 use self_cell::self_cell;
+use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 
 type Tree<'m> = s3d_render::Scene<'m>;
@@ -148,13 +149,12 @@ impl Scene {
         threads: Option<usize>,
     ) -> PyResult<(Column<'py, f64>, Column<'py, i32>)> {
         let (origins, directions) = rays(&origins, &directions)?;
-        let hits: (Vec<f64>, Vec<i32>) = few_or_many(py, threads, directions.len(), || {
-            let found = cast_rays(self.tree(), &origins, &directions).into_iter();
-            found
-                .map(|hit| hit.map_or((f64::NAN, -1), |hit| (hit.t, hit.face as i32)))
-                .unzip()
+        let hits = in_parts(py, threads, directions.len(), |part| {
+            cast_rays(self.tree(), of_part(&origins, &part), of_part(&directions, &part))
         })?;
-        Ok((PyArray1::from_vec(py, hits.0), PyArray1::from_vec(py, hits.1)))
+        let numbers = |hit: Option<Hit>| hit.map_or((f64::NAN, -1), |hit| (hit.t, hit.face as i32));
+        let (t, face) = hits.into_iter().map(numbers).unzip();
+        Ok((PyArray1::from_vec(py, t), PyArray1::from_vec(py, face)))
     }
 
     /// Returns whether each ray hits a face before this multiple of its direction.
@@ -167,8 +167,8 @@ impl Scene {
         threads: Option<usize>,
     ) -> PyResult<Column<'py, bool>> {
         let (origins, directions) = rays(&origins, &directions)?;
-        let found = few_or_many(py, threads, directions.len(), || {
-            are_rays_blocked(self.tree(), &origins, &directions, before)
+        let found = in_parts(py, threads, directions.len(), |part| {
+            are_rays_blocked(self.tree(), of_part(&origins, &part), of_part(&directions, &part), before)
         })?;
         Ok(PyArray1::from_vec(py, found))
     }
@@ -182,8 +182,10 @@ impl Scene {
         threads: Option<usize>,
     ) -> PyResult<Column<'py, u32>> {
         let (origins, directions) = rays(&origins, &directions)?;
-        let call = || count_hits(self.tree(), &origins, &directions);
-        Ok(PyArray1::from_vec(py, few_or_many(py, threads, directions.len(), call)?))
+        let found = in_parts(py, threads, directions.len(), |part| {
+            count_hits(self.tree(), of_part(&origins, &part), of_part(&directions, &part))
+        })?;
+        Ok(PyArray1::from_vec(py, found))
     }
 
     /// Returns the nearest place of the mesh to each point, its distance in metres, and its face. They are
@@ -195,9 +197,9 @@ impl Scene {
         threads: Option<usize>,
     ) -> PyResult<(Rows<'py, f32>, Column<'py, f32>, Column<'py, i32>)> {
         let points = arrays::points("points", &points)?;
-        let found = few_or_many(py, threads, points.len(), || {
+        let found = in_parts(py, threads, points.len(), |part| {
             let mut found = Vec::new();
-            self.nearest().nearest_many(&points, &mut found);
+            self.nearest().nearest_many(of_part(&points, &part), &mut found);
             found
         })?;
         let of_finite = |nearest: &Nearest, value: f32| match nearest.face {
@@ -224,7 +226,8 @@ impl Scene {
         threads: Option<usize>,
     ) -> PyResult<Column<'py, bool>> {
         let points = arrays::points_f64("points", &points)?;
-        let found = few_or_many(py, threads, points.len(), || are_inside(self.tree(), &points))?;
+        let found =
+            in_parts(py, threads, points.len(), |part| are_inside(self.tree(), of_part(&points, &part)))?;
         Ok(PyArray1::from_vec(py, found))
     }
 
@@ -295,6 +298,9 @@ const MODALITIES: [&str; 5] = ["rgb", "depth", "normal", "xyz", "face"];
 /// So many rays or points are looked at on the calling thread.
 const FEW_RAYS: usize = 1024;
 
+/// So many are looked at between two looks for signals: up to a second or two of work.
+const PART: usize = 1 << 21;
+
 /// Returns rays from their arrays: one origin, or one for each direction.
 fn rays(
     origins: &PyReadonlyArray2<'_, f64>,
@@ -315,19 +321,35 @@ fn rays(
     Ok((origins, directions))
 }
 
-/// Calls `call` without Python's lock: for few rays or points on this thread, since they take less time than
-/// the start of another.
-fn few_or_many<T: Send>(
+/// Calls `call` with parts of so many rays or points, without Python's lock, and joins what it finds. A few are
+/// looked at on this thread, since they take less time than the start of another. Between two parts, Python may
+/// raise an exception, such as that of Ctrl-C.
+fn in_parts<T: Send>(
     py: Python<'_>,
     threads: Option<usize>,
     count: usize,
-    call: impl FnOnce() -> T + Send,
-) -> PyResult<T> {
+    call: impl Fn(Range<usize>) -> Vec<T> + Sync,
+) -> PyResult<Vec<T>> {
     if count <= FEW_RAYS {
-        Ok(py.detach(call))
-    } else {
-        detached(py, threads, call)
+        return Ok(py.detach(|| call(0..count)));
     }
+    let mut all = Vec::new();
+    for start in (0..count).step_by(PART) {
+        py.check_signals()?;
+        let mut part = detached(py, threads, || call(start..count.min(start + PART)))?;
+        if all.is_empty() {
+            all = part;
+            all.reserve_exact(count - all.len());
+        } else {
+            all.append(&mut part);
+        }
+    }
+    Ok(all)
+}
+
+/// The rays or points of a part. One origin is that of all rays.
+fn of_part<'a, T>(all: &'a [T], part: &Range<usize>) -> &'a [T] {
+    if all.len() == 1 { all } else { all.get(part.clone()).unwrap_or_default() }
 }
 
 /// The bytes of a pixel's hit: its face and its depth.

@@ -7,6 +7,7 @@ use crate::shade::channels::{assert_size, fit};
 use crate::shade::patch::FaceCache;
 use glam::Vec3;
 use s3d_geom::{Camera, Projection, Raster};
+use s3d_simd::{dispatch, level};
 
 /// The radius of the sphere around a point in which normals count, metres.
 const RADIUS_M: f32 = 0.15;
@@ -14,8 +15,6 @@ const RADIUS_M: f32 = 0.15;
 const BLOCK: usize = 4;
 /// The samples on each side of a block, along rows and columns.
 const REACH: i32 = 2;
-/// The samples along a side.
-const SIDE: usize = 2 * REACH as usize + 1;
 
 /// Writes how much a surface is a corner into an existing image: 255 · √(27 det C), rounded. C is the mean
 /// of n nᵀ over the unit normals n of the surface that is seen within 0.15 m of the pixel's point. Its
@@ -36,127 +35,221 @@ pub fn corner_image_into(scene: &Scene<'_>, hits: &Hits, camera: &Camera, out: &
     assert_size(hits, camera);
     fit(out, &hits.face, 0);
     let width = hits.face.width() as usize;
-    let samples = Samples::new(scene, hits, camera);
     // The pixels that a metre at a distance of a metre covers.
     let pixels_per_m = match camera.projection {
         Projection::Equirectangular => camera.width as f32 / std::f32::consts::TAU,
         _ => camera.k_matrix()[0][0].max(camera.k_matrix()[1][1]) as f32,
     };
 
+    let samples = Samples::new(scene, hits, camera, pixels_per_m);
+    let mut levels = vec![0u8; samples.columns];
     for (block_row, rows) in out.pixels_mut().chunks_mut(BLOCK * width.max(1)).enumerate() {
+        dispatch!(level(), _simd => samples.row_levels(block_row, pixels_per_m, &mut levels));
         let (row, copies) = rows.split_at_mut(width);
-        for (column, pixels) in row.chunks_mut(BLOCK).enumerate() {
-            let interest = samples.interest(column as i32, block_row as i32, pixels_per_m);
-            pixels.fill((255.0 * interest + 0.5).min(255.0) as u8);
+        for (pixels, level) in row.chunks_mut(BLOCK).zip(&levels) {
+            pixels.fill(*level);
         }
         copies
             .chunks_mut(width.max(1))
             .for_each(|copy| copy.copy_from_slice(row));
     }
 
-    for (out, face) in out.pixels_mut().iter_mut().zip(hits.face.pixels()) {
-        *out = if *face == NO_FACE { 0 } else { *out };
-    }
+    dispatch!(level(), _simd => {
+        for (out, face) in out.pixels_mut().iter_mut().zip(hits.face.pixels()) {
+            *out = if *face == NO_FACE { 0 } else { *out };
+        }
+    });
 }
 
-/// A sample: a point relative to the camera, and the normal of its face. The depth of a sample that sees
-/// nothing is infinite.
-#[derive(Clone, Copy)]
-struct Sample {
-    point: Vec3,
-    normal: Vec3,
-    depth: f32,
-}
-
-/// A sample for each block.
+/// A sample for each block, by column: the point relative to the camera, the normal of its face, and its depth,
+/// which is infinite where nothing is seen. Each row has a margin on both sides: those of the other side of a
+/// panorama, and repeated samples elsewhere.
 struct Samples {
-    columns: i32,
-    rows: i32,
-    samples: Vec<Sample>,
+    columns: usize,
+    rows: usize,
+    points: [Vec<f32>; 3],
+    normals: [Vec<f32>; 3],
+    depths: Vec<f32>,
+    margin: usize,
     wraps: bool,
 }
 
+/// The blocks that are looked at together, at most. Sums are made for so many in any case.
+const TOGETHER: usize = 16;
+/// The samples of a margin, at most.
+const MOST_MARGIN: i32 = 256;
+
+/// What the samples around some blocks add up to.
+struct Sums {
+    /// The sums of n nᵀ: xx, yy, zz, xy, xz, yz.
+    squares: [[f32; TOGETHER]; 6],
+    counts: [f32; TOGETHER],
+    /// Whether a normal differs from that of the middle.
+    bends: [u32; TOGETHER],
+}
+
 impl Samples {
-    fn new(scene: &Scene<'_>, hits: &Hits, camera: &Camera) -> Self {
+    fn new(scene: &Scene<'_>, hits: &Hits, camera: &Camera, pixels_per_m: f32) -> Self {
+        let nearest = hits.depth.pixels().iter().fold(f32::INFINITY, |a, b| if *b < a { *b } else { a });
+        let margin = REACH.saturating_mul(step(nearest, pixels_per_m)).min(MOST_MARGIN);
         let (width, height) = (hits.face.width(), hits.face.height());
         let block = BLOCK as u32;
         let (columns, rows) = (width.div_ceil(block), height.div_ceil(block));
         let rays = camera.rays();
         let eye = camera.pose.location;
-        let mut normals = FaceCache::new();
-        let mut samples = Vec::with_capacity(columns as usize * rows as usize);
+        let mut normal_of_face = FaceCache::new();
+        let wraps = camera.is_panorama();
+        let (mut points, mut normals) = <([Vec<f32>; 3], [Vec<f32>; 3])>::default();
+        let mut row_values: [Vec<f32>; 6] = Default::default();
+        let mut depths = Vec::with_capacity(columns as usize * rows as usize);
         for row in 0..rows {
             let y = (row * block + block / 2).min(height - 1);
             for column in 0..columns {
                 let x = (column * block + block / 2).min(width - 1);
                 let (face, depth) = (hits.face.at(x, y), hits.depth.at(x, y));
-                samples.push(if face == NO_FACE {
-                    Sample { point: Vec3::ZERO, normal: Vec3::ZERO, depth: f32::INFINITY }
+                let (point, normal) = if face == NO_FACE {
+                    (Vec3::ZERO, Vec3::ZERO)
                 } else {
                     let ray = rays.at(x, y);
-                    let normal = *normals.get(face, || Plane::new(scene.mesh(), face, eye).normal.as_vec3());
-                    let normal = if normal.dot(ray.as_vec3()) > 0.0 {
-                        -normal
-                    } else {
-                        normal
-                    };
-                    Sample { point: (ray * f64::from(depth)).as_vec3(), normal, depth }
-                });
+                    let normal =
+                        *normal_of_face.get(face, || Plane::new(scene.mesh(), face, eye).normal.as_vec3());
+                    let faces_away = normal.dot(ray.as_vec3()) > 0.0;
+                    ((ray * f64::from(depth)).as_vec3(), if faces_away { -normal } else { normal })
+                };
+                let values = point.to_array().into_iter().chain(normal.to_array());
+                row_values.iter_mut().zip(values).for_each(|(of, value)| of.push(value));
+                depths.push(if face == NO_FACE { f32::INFINITY } else { depth });
+            }
+
+            for (of, values) in points.iter_mut().chain(&mut normals).zip(&mut row_values) {
+                let beyond = |column: i32| values[column_at(column, columns as usize, wraps)];
+                of.extend((-margin..0).map(beyond));
+                of.extend_from_slice(values);
+                of.extend((columns as i32..columns as i32 + margin).map(beyond));
+                values.clear();
             }
         }
-        Self { columns: columns as i32, rows: rows as i32, samples, wraps: camera.is_panorama() }
+        // The last blocks are looked at with some that are not there.
+        let all = points.iter_mut().chain(&mut normals);
+        all.for_each(|column| column.extend([0.0; TOGETHER]));
+        Self { columns: columns as usize, rows: rows as usize, points, normals, depths, margin: margin as usize, wraps }
     }
 
-    /// Returns the column of a sample. Columns beyond a border are the one at it.
-    fn column(&self, column: i32) -> usize {
-        if self.wraps {
-            column.rem_euclid(self.columns) as usize
-        } else {
-            column.clamp(0, self.columns - 1) as usize
-        }
-    }
-
-    /// Returns the first sample of a row, likewise.
+    /// Returns where the points and normals of a row begin, behind its margin. Rows beyond a border are the one
+    /// at it.
+    #[inline(always)]
     fn row(&self, row: i32) -> usize {
-        (row.clamp(0, self.rows - 1) * self.columns) as usize
+        let row = row.clamp(0, self.rows as i32 - 1) as usize;
+        row * (self.columns + 2 * self.margin) + self.margin
     }
 
-    /// Returns how much the surface at a block is a corner, 0 to 1.
-    fn interest(&self, column: i32, row: i32, pixels_per_m: f32) -> f32 {
-        let middle = self.samples[self.row(row) + self.column(column)];
-        if middle.depth == f32::INFINITY {
-            return 0.0;
+    /// Writes the level of each block of a row. Blocks next to each other whose samples are as far apart are
+    /// looked at together, so that their samples lie next to each other, too.
+    #[inline(always)]
+    fn row_levels(&self, row: usize, pixels_per_m: f32, levels: &mut [u8]) {
+        let start = row * self.columns;
+        let mut column = 0;
+        while column < self.columns {
+            if self.depths[start + column] == f32::INFINITY {
+                levels[column] = 0;
+                column += 1;
+                continue;
+            }
+            let apart = step(self.depths[start + column], pixels_per_m);
+            // Beyond the margin, samples are not next to each other.
+            let most = if (REACH * apart) as usize > self.margin { 1 } else { TOGETHER.min(self.columns - column) };
+            let mut count = 1;
+            while count < most && step(self.depths[start + column + count], pixels_per_m) == apart {
+                count += 1;
+            }
+            self.levels(row, column, apart, &mut levels[column..column + count]);
+            column += count;
         }
-        let blocks = RADIUS_M * pixels_per_m / (middle.depth * BLOCK as f32);
-        let step = ((blocks / REACH as f32 + 0.5) as i32).max(1);
+    }
 
-        let columns: [usize; SIDE] = std::array::from_fn(|n| self.column(column + (n as i32 - REACH) * step));
-
-        // The sum of n nᵀ: xx, yy, zz, xy, xz, yz.
-        let mut sums = [0f32; 6];
-        let mut count = 0f32;
-        let mut is_plane = true;
+    /// Writes the levels of blocks from a column on, whose samples are `step` blocks apart.
+    #[inline(always)]
+    fn levels(&self, row: usize, column: usize, step: i32, levels: &mut [u8]) {
+        let row = row as i32;
+        let middle = self.row(row) + column;
+        let mut sums =
+            Sums { squares: [[0.0; TOGETHER]; 6], counts: [0.0; TOGETHER], bends: [0; TOGETHER] };
         for dy in -REACH..=REACH {
             let start = self.row(row + dy * step);
-            for column in columns {
-                let sample = &self.samples[start + column];
-                if (sample.point - middle.point).length_squared() > RADIUS_M * RADIUS_M {
-                    continue;
-                }
-                let Vec3 { x, y, z } = sample.normal;
-                is_plane &= sample.normal == middle.normal;
-                let [xx, yy, zz, xy, xz, yz] = &mut sums;
-                (*xx, *yy, *zz) = (*xx + x * x, *yy + y * y, *zz + z * z);
-                (*xy, *xz, *yz) = (*xy + x * y, *xz + x * z, *yz + y * z);
-                count += 1.0;
+            for dx in -REACH..=REACH {
+                let away = column as i32 + dx * step;
+                let is_in_margin = (REACH * step) as usize <= self.margin;
+                let sample = if is_in_margin {
+                    (start as i32 + away) as usize
+                } else {
+                    start + column_at(away, self.columns, self.wraps)
+                };
+                self.add(middle, sample, &mut sums);
             }
         }
-        if is_plane {
-            return 0.0;
-        }
 
-        let [xx, yy, zz, xy, xz, yz] = sums.map(|sum| sum / count);
-        let determinant = xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz);
-        (27.0 * determinant.max(0.0)).sqrt()
+        let [xx, yy, zz, xy, xz, yz] = &sums.squares;
+        let mut found = [0u8; TOGETHER];
+        for (i, level) in found.iter_mut().enumerate() {
+            let count = sums.counts[i];
+            let (xx, yy, zz) = (xx[i] / count, yy[i] / count, zz[i] / count);
+            let (xy, xz, yz) = (xy[i] / count, xz[i] / count, yz[i] / count);
+            let determinant = xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz);
+            let interest = (27.0 * determinant.max(0.0)).sqrt();
+            let shown = (255.0 * interest + 0.5).min(255.0) as u8;
+            *level = if sums.bends[i] == 0 { 0 } else { shown };
+        }
+        for ((level, found), depth) in levels.iter_mut().zip(&found).zip(&self.depths[row as usize * self.columns + column..]) {
+            *level = if *depth == f32::INFINITY { 0 } else { *found };
+        }
     }
+
+    /// Adds one sample for each block, from the one at `middle` on.
+    #[inline(always)]
+    fn add(&self, middle: usize, sample: usize, sums: &mut Sums) {
+        let ([px, py, pz], [nx, ny, nz]) = (lanes(&self.points, sample), lanes(&self.normals, sample));
+        let [own_x, own_y, own_z] = lanes(&self.points, middle);
+        let [own_nx, own_ny, own_nz] = lanes(&self.normals, middle);
+        let [xx, yy, zz, xy, xz, yz] = &mut sums.squares;
+        for i in 0..TOGETHER {
+            let (dx, dy, dz) = (px[i] - own_x[i], py[i] - own_y[i], pz[i] - own_z[i]);
+            let is_near = dx * dx + dy * dy + dz * dz <= RADIUS_M * RADIUS_M;
+            let weight = if is_near { 1.0 } else { 0.0 };
+            let (x, y, z) = (nx[i] * weight, ny[i] * weight, nz[i] * weight);
+            xx[i] += x * x;
+            yy[i] += y * y;
+            zz[i] += z * z;
+            xy[i] += x * y;
+            xz[i] += x * z;
+            yz[i] += y * z;
+            sums.counts[i] += weight;
+            let differs = (nx[i] != own_nx[i]) | (ny[i] != own_ny[i]) | (nz[i] != own_nz[i]);
+            sums.bends[i] |= u32::from(is_near & differs);
+        }
+    }
+}
+
+/// Returns how many blocks lie between the samples around a point.
+#[inline(always)]
+fn step(depth: f32, pixels_per_m: f32) -> i32 {
+    let blocks = RADIUS_M * pixels_per_m / (depth * BLOCK as f32);
+    ((blocks / REACH as f32 + 0.5) as i32).clamp(1, 1 << 20)
+}
+
+/// Returns a column that may be beyond a border: there it is the one at it, or one from the other side.
+#[inline(always)]
+fn column_at(column: i32, columns: usize, wraps: bool) -> usize {
+    if wraps {
+        column.rem_euclid(columns as i32) as usize
+    } else {
+        column.clamp(0, columns as i32 - 1) as usize
+    }
+}
+
+/// Returns the values of each column from `at` on.
+#[inline(always)]
+fn lanes(columns: &[Vec<f32>; 3], at: usize) -> [&[f32; TOGETHER]; 3] {
+    let none = &[0.0; TOGETHER];
+    let [x, y, z] = columns;
+    [x[at..].first_chunk().unwrap_or(none), y[at..].first_chunk().unwrap_or(none), z[at..].first_chunk().unwrap_or(none)]
 }

@@ -1,9 +1,10 @@
 //! Euclidean depth, and the mask of pixels that see something.
 
-use super::plane::RayLengths;
+use super::plane::{RayLengths, rounded_down};
 use crate::hits::{Hits, NO_FACE};
 use crate::shade::channels::{assert_size, fit};
 use s3d_geom::{Camera, Raster};
+use s3d_simd::{dispatch, level};
 
 /// Writes the distance of each pixel's point from the camera into an existing image, in units of which
 /// `units_per_m` make a metre, rounded half up. [`MISSING_DEPTH`](crate::MISSING_DEPTH) where nothing is seen
@@ -19,11 +20,13 @@ pub fn euclidean_depth_image_into(hits: &Hits, camera: &Camera, units_per_m: f64
     let mut row_lengths = vec![0.0; width];
     let rows = hits.depth.rows().zip(out.pixels_mut().chunks_exact_mut(width));
     for (row, (depths, out)) in rows.enumerate() {
-        lengths.row(row, &mut row_lengths);
-        for ((depth, length), out) in depths.iter().zip(&row_lengths).zip(out) {
-            // The cast rounds down and saturates, also at infinity.
-            *out = (f64::from(*depth) * length * units_per_m + 0.5) as u16;
-        }
+        dispatch!(level(), _simd => {
+            lengths.row(row, &mut row_lengths);
+            for ((depth, length), out) in depths.iter().zip(&row_lengths).zip(out) {
+                // Infinity becomes the largest number.
+                *out = rounded_down(f64::from(*depth) * length * units_per_m + 0.5, 65_535.0) as u16;
+            }
+        });
     }
 }
 

@@ -1,6 +1,7 @@
 //! Gray levels of a colour image, with a margin.
 
 use s3d_geom::Raster;
+use s3d_simd::{dispatch, level};
 
 /// The gray levels of an image with a margin on all sides: those of the other side of a panorama, and
 /// repeated pixels elsewhere.
@@ -40,7 +41,10 @@ impl PaddedGray {
 /// Returns the gray levels of colours: (19,595 R + 38,470 G + 7,471 B + 32,768) / 65,536, rounded down. They
 /// are the luma of ITU-R BT.601 with the integers of Pillow's `convert("L")`.
 pub fn gray_image(colors: &Raster<[u8; 3]>) -> Raster<u8> {
-    colors.map(|[r, g, b]| {
-        ((19_595 * u32::from(r) + 38_470 * u32::from(g) + 7_471 * u32::from(b) + 32_768) >> 16) as u8
+    dispatch!(level(), _simd => {
+        let gray = |[r, g, b]: &[u8; 3]| {
+            ((19_595 * u32::from(*r) + 38_470 * u32::from(*g) + 7_471 * u32::from(*b) + 32_768) >> 16) as u8
+        };
+        Raster::from_vec(colors.width(), colors.height(), colors.pixels().iter().map(gray).collect())
     })
 }

@@ -3,6 +3,7 @@
 use super::gray::PaddedGray;
 use crate::shade::channels::fit;
 use s3d_geom::Raster;
+use s3d_simd::{dispatch, level};
 
 /// The pixels on each side that a response depends on.
 const MARGIN: usize = 14;
@@ -22,8 +23,14 @@ pub fn keypoint_image_into(gray: &Raster<u8>, wraps: bool, out: &mut Raster<u8>)
     if gray.is_empty() {
         return;
     }
+    let padded = PaddedGray::new(gray, MARGIN, wraps);
     let width = gray.width() as usize;
-    let sums = BoxSums::new(&PaddedGray::new(gray, MARGIN, wraps));
+    dispatch!(level(), _simd => draw(&padded, width, out));
+}
+
+#[inline(always)]
+fn draw(padded: &PaddedGray, width: usize, out: &mut Raster<u8>) {
+    let sums = BoxSums::new(padded);
     let mut responses = vec![0f32; width.div_ceil(2)];
     for (pair, rows) in out.pixels_mut().chunks_mut(2 * width).enumerate() {
         responses.fill(0.0);
@@ -42,82 +49,89 @@ pub fn keypoint_image_into(gray: &Raster<u8>, wraps: bool, out: &mut Raster<u8>)
     }
 }
 
-/// The sums of levels above and to the left of each place.
+/// The sums of levels above and to the left of each place. A line has its even columns first, and then the
+/// odd ones: responses are two columns apart, and so next to each other.
 struct BoxSums {
-    line: usize,
+    /// The even columns of a line, and the odd ones.
+    half: usize,
     sums: Vec<u32>,
 }
 
 impl BoxSums {
+    #[inline(always)]
     fn new(gray: &PaddedGray) -> Self {
-        let line = gray.line + 1;
+        let half = (gray.line + 1).div_ceil(2);
         let rows = gray.levels.len() / gray.line;
-        let mut sums = vec![0u32; line * (rows + 1)];
+        let mut sums = vec![0u32; 2 * half * (rows + 1)];
+        let mut across = vec![0u32; 2 * half];
         for (row, levels) in gray.levels.chunks_exact(gray.line).enumerate() {
-            let (above, rest) = sums[row * line..].split_at_mut(line);
             let mut sum = 0u32;
-            for ((level, above), out) in levels.iter().zip(&above[1..]).zip(&mut rest[1..line]) {
+            for (level, out) in levels.iter().zip(&mut across[1..]) {
                 // Sums of large images wrap around, and their differences do not mind.
                 sum = sum.wrapping_add(u32::from(*level));
-                *out = above.wrapping_add(sum);
+                *out = sum;
+            }
+
+            let (above, rest) = sums[row * 2 * half..].split_at_mut(2 * half);
+            let (even, odd) = rest[..2 * half].split_at_mut(half);
+            let (even_above, odd_above) = above.split_at(half);
+            let outs = even.iter_mut().zip(even_above).zip(odd.iter_mut().zip(odd_above));
+            for (pair, ((even, even_above), (odd, odd_above))) in across.chunks_exact(2).zip(outs) {
+                *even = even_above.wrapping_add(pair[0]);
+                *odd = odd_above.wrapping_add(pair[1]);
             }
         }
-        Self { line, sums }
+        Self { half, sums }
     }
 
     /// Raises the responses of every second pixel of a row to the determinants of the filter whose third is
     /// `LOBE` pixels wide. `row` counts the margin.
+    #[inline(always)]
     fn determinants<const LOBE: usize>(&self, row: usize, responses: &mut [f32]) {
+        let count = responses.len();
         let width = 3 * LOBE;
         let (half, third) = (width / 2, LOBE / 2);
-        let line = |row: usize| &self.sums[row * self.line..(row + 1) * self.line];
-        // Bands of rows.
-        let (top, bottom) = (line(row - half), line(row + half + 1));
-        let (high, low) = (line(row + 1 - LOBE), line(row + LOBE));
-        let (third_high, third_low) = (line(row - third), line(row + third + 1));
-        let (upper, lower) = (line(row - LOBE), line(row + LOBE + 1));
-        let (at, after) = (line(row), line(row + 1));
+        // The sums at a column of the window around each response.
+        let line = |row: usize| &self.sums[row * 2 * self.half..(row + 1) * 2 * self.half];
+        let at = |row: usize, x: usize| {
+            let start = (x % 2) * self.half + x / 2;
+            &line(row)[start..start + count]
+        };
+        let corners = |top: usize, bottom: usize, left: usize, right: usize| {
+            [at(bottom, right), at(top, right), at(bottom, left), at(top, left)]
+        };
+
+        let x = MARGIN;
+        let (high, low) = (row + 1 - LOBE, row + LOBE);
+        let (left, right) = (x + 1 - LOBE, x + LOBE);
+        let wide = corners(high, low, x - half, x + half + 1);
+        let wide_middle = corners(high, low, x - third, x + third + 1);
+        let tall = corners(row - half, row + half + 1, left, right);
+        let tall_middle = corners(row - third, row + third + 1, left, right);
+        let upper_left = corners(row - LOBE, row, x - LOBE, x);
+        let lower_right = corners(row + 1, row + LOBE + 1, x + 1, x + LOBE + 1);
+        let upper_right = corners(row - LOBE, row, x + 1, x + LOBE + 1);
+        let lower_left = corners(row + 1, row + LOBE + 1, x - LOBE, x);
         let scale = 1.0 / (255.0 * (width * width) as f32);
 
         for (n, response) in responses.iter_mut().enumerate() {
-            // Windows of a known length need no checks of their places.
-            let [top, bottom] = [window(top, n), window(bottom, n)];
-            let [high, low] = [window(high, n), window(low, n)];
-            let [third_high, third_low] = [window(third_high, n), window(third_low, n)];
-            let [upper, lower, at, after] =
-                [window(upper, n), window(lower, n), window(at, n), window(after, n)];
-            let (x, tall) = (MARGIN, (MARGIN + 1 - LOBE, MARGIN + LOBE));
-
-            let xx = sum(high, low, x - half, x + half + 1).wrapping_sub(3u32.wrapping_mul(sum(
-                high,
-                low,
-                x - third,
-                x + third + 1,
-            )));
-            let yy = sum(top, bottom, tall.0, tall.1)
-                .wrapping_sub(3u32.wrapping_mul(sum(third_high, third_low, tall.0, tall.1)));
-            let xy = sum(upper, at, x - LOBE, x)
-                .wrapping_add(sum(after, lower, x + 1, x + LOBE + 1))
-                .wrapping_sub(sum(upper, at, x + 1, x + LOBE + 1))
-                .wrapping_sub(sum(after, lower, x - LOBE, x));
+            let xx = sum(&wide, n).wrapping_sub(sum(&wide_middle, n).wrapping_mul(3));
+            let yy = sum(&tall, n).wrapping_sub(sum(&tall_middle, n).wrapping_mul(3));
+            let xy = sum(&upper_left, n)
+                .wrapping_add(sum(&lower_right, n))
+                .wrapping_sub(sum(&upper_right, n))
+                .wrapping_sub(sum(&lower_left, n));
             let (xx, yy, xy) = (xx as i32 as f32 * scale, yy as i32 as f32 * scale, xy as i32 as f32 * scale);
-            *response = response.max(xx * yy - MIXED * xy * xy);
+            let determinant = xx * yy - MIXED * xy * xy;
+            *response = if determinant > *response { determinant } else { *response };
         }
     }
 }
 
-/// The places of a line that a response depends on.
-const SPAN: usize = 2 * MARGIN + 1;
-
-/// Returns the places around a response.
+/// Returns the sum of the levels of the box around a response.
 #[inline(always)]
-fn window(line: &[u32], response: usize) -> &[u32; SPAN] {
-    line[2 * response..].first_chunk().unwrap_or(&[0; SPAN])
-}
-
-/// Returns the sum of the levels of a box.
-#[inline(always)]
-fn sum(top: &[u32; SPAN], bottom: &[u32; SPAN], left: usize, right: usize) -> u32 {
-    let right = bottom[right].wrapping_sub(top[right]);
-    right.wrapping_sub(bottom[left].wrapping_sub(top[left]))
+fn sum(corners: &[&[u32]; 4], response: usize) -> u32 {
+    let [bottom_right, top_right, bottom_left, top_left] = corners;
+    let right = bottom_right[response].wrapping_sub(top_right[response]);
+    right.wrapping_sub(bottom_left[response].wrapping_sub(top_left[response]))
 }

@@ -6,11 +6,14 @@ use crate::scene::Scene;
 use crate::shade::channels::{assert_size, fit};
 use crate::shade::patch::FaceCache;
 use s3d_geom::{Camera, Raster, Rays};
+use s3d_simd::{dispatch, level};
 
 /// The smallest step of depth that is an edge, metres.
 const STEP_M: f64 = 0.01;
 /// The same as a share of the depth.
 const STEP_SHARE: f64 = 0.005;
+/// No smaller step is an edge in 32 bits either, whatever their rounding.
+const LEAST_STEP_M: f32 = 0.009_99;
 /// The cosine between ray and normal below which a plane leaves the image too steeply to tell where its
 /// surface goes on.
 const STEEP: f64 = 0.1;
@@ -52,17 +55,46 @@ pub fn occlusion_edge_image_into(scene: &Scene<'_>, hits: &Hits, camera: &Camera
         }
     };
 
-    for row in 0..hits.face.height() as usize {
-        let start = row * width;
-        for at in start..start + width {
-            if at + 1 < start + width {
-                compare(at, at + 1);
-            } else if wraps {
-                compare(at, start);
-            }
-            if at + width < faces.len() {
-                compare(at, at + width);
-            }
+    // Few neighbours have a step between them, and wide registers find those.
+    let mut has_step = vec![0u8; width];
+    for start in (0..faces.len()).step_by(width.max(1)) {
+        let row = start..start + width;
+        let (row_faces, row_depths) = (&faces[row.clone()], &depths[row.clone()]);
+        let last = width - 1;
+        let right = (&faces[start + 1..start + width], &depths[start + 1..start + width]);
+        find_steps((&row_faces[..last], &row_depths[..last]), right, &mut has_step);
+        for_each_step(&has_step[..last], |x| compare(start + x, start + x + 1));
+        if wraps {
+            compare(start + last, start);
+        }
+        if row.end < faces.len() {
+            let below = row.end..row.end + width;
+            find_steps((row_faces, row_depths), (&faces[below.clone()], &depths[below]), &mut has_step);
+            for_each_step(&has_step, |x| compare(start + x, start + width + x));
+        }
+    }
+}
+
+/// The faces and depths of some pixels.
+type Pixels<'a> = (&'a [u32], &'a [f32]);
+
+/// Writes 1 where two pixels see different faces, and a step of depth that may be an edge.
+fn find_steps(a: Pixels<'_>, b: Pixels<'_>, out: &mut [u8]) {
+    dispatch!(level(), _simd => {
+        let pixels = a.0.iter().zip(a.1).zip(b.0.iter().zip(b.1));
+        for (((face, depth), (other, other_depth)), out) in pixels.zip(out) {
+            let is_step = (depth - other_depth).abs() > LEAST_STEP_M;
+            *out = u8::from(is_step & (face != other) & (*face != NO_FACE) & (*other != NO_FACE));
+        }
+    });
+}
+
+/// Calls `then` with the place of each pixel that has a step.
+fn for_each_step(has_step: &[u8], mut then: impl FnMut(usize)) {
+    for (group, steps) in has_step.chunks(32).enumerate() {
+        if steps.iter().fold(0, |any, step| any | step) != 0 {
+            let places = steps.iter().enumerate().filter(|(_, step)| **step != 0);
+            places.for_each(|(place, _)| then(32 * group + place));
         }
     }
 }

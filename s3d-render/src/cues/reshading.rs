@@ -1,11 +1,12 @@
 //! Shading without colours: a lamp at the camera lights a white scene.
 
-use super::plane::{Plane, RayLengths};
+use super::plane::{Plane, RayLengths, rounded_down};
 use crate::hits::{Hits, NO_FACE};
 use crate::scene::Scene;
 use crate::shade::channels::{assert_size, fit};
 use crate::shade::patch::FaceCache;
 use s3d_geom::{Camera, Raster};
+use s3d_simd::{dispatch, level};
 
 /// The energy of the lamp.
 const ENERGY: f64 = 2.5;
@@ -28,26 +29,32 @@ pub fn reshading_image_into(scene: &Scene<'_>, hits: &Hits, camera: &Camera, out
     let width = (hits.face.width() as usize).max(1);
     let lengths = RayLengths::new(camera);
     let mut row_lengths = vec![0.0; width];
+    // How far the plane of each pixel's face is.
+    let mut row_offsets = vec![0.0; width];
     let mut distance_of_plane = FaceCache::new();
 
     let rows = hits.face.rows().zip(hits.depth.rows());
     for (row, ((faces, depths), out)) in rows.zip(out.pixels_mut().chunks_exact_mut(width)).enumerate() {
-        lengths.row(row, &mut row_lengths);
         let mut last = (NO_FACE, 0.0);
-        for (((face, depth), length), out) in faces.iter().zip(depths).zip(&row_lengths).zip(out) {
-            if *face == NO_FACE {
-                *out = 0;
-                continue;
-            }
-            if *face != last.0 {
+        for (face, offset) in faces.iter().zip(&mut row_offsets) {
+            if *face != last.0 && *face != NO_FACE {
                 let offset =
                     distance_of_plane.get(*face, || Plane::new(scene.mesh(), *face, eye).offset.abs());
                 last = (*face, *offset);
             }
-            // The cosine is the plane's distance over the point's.
-            let distance = f64::from(*depth) * length;
-            let light = 255.0 * ENERGY * HALF_LIFE * last.1 / (distance * (HALF_LIFE + distance * distance));
-            *out = (light + 0.5).clamp(1.0, 255.0) as u8;
+            *offset = last.1;
         }
+
+        dispatch!(level(), _simd => {
+            lengths.row(row, &mut row_lengths);
+            let planes = row_lengths.iter().zip(&row_offsets);
+            for (((face, depth), (length, offset)), out) in faces.iter().zip(depths).zip(planes).zip(out) {
+                // The cosine is the plane's distance over the point's.
+                let distance = f64::from(*depth) * length;
+                let light = 255.0 * ENERGY * HALF_LIFE * offset / (distance * (HALF_LIFE + distance * distance));
+                let level = rounded_down(light + 0.5, 255.0).max(1) as u8;
+                *out = if *face == NO_FACE { 0 } else { level };
+            }
+        });
     }
 }

@@ -5,7 +5,8 @@ use crate::hits::{Hits, NO_FACE};
 use crate::scene::Scene;
 use crate::shade::channels::{assert_size, fit};
 use crate::shade::patch::FaceCache;
-use s3d_geom::{Camera, Raster, Rays, segment_graph};
+use s3d_geom::{Camera, DisjointSets, Raster, Rays, segment_graph};
+use s3d_simd::{dispatch, level};
 
 /// The scale of segments: the larger, the larger the segments.
 const SCALE: f64 = 300.0;
@@ -13,6 +14,8 @@ const SCALE: f64 = 300.0;
 const FEWEST: f64 = 50.0;
 /// The largest difference of neighbours.
 const MOST: u16 = 511;
+/// The difference from a neighbour that is not there, or sees nothing.
+const NONE: u16 = u16::MAX;
 
 /// Writes segments of similar colour into an existing image: their numbers from 1, in the order of their
 /// first pixels. After 65,535 numbers start again. 0 where nothing is seen.
@@ -27,14 +30,11 @@ pub fn color_segment_image_into(colors: &Raster<[u8; 3]>, hits: &Hits, wraps: bo
     let (width, height) = (hits.face.width(), hits.face.height());
     assert!((colors.width(), colors.height()) == (width, height), "colours and hits have one size");
     let grid = Grid::new(hits, wraps);
-    let colors = blurred(&halved(colors), wraps);
-    let colors = colors.pixels();
-    let difference = |a: usize, b: usize| {
-        let (from, to) = (&colors[a], &colors[b]);
-        let [r, g, b] = [0, 1, 2].map(|k| i32::from(from[k]) - i32::from(to[k]));
-        (((r * r + g * g + b * b) as f32).sqrt() + 0.5) as u16
-    };
-    grid.segment(difference, hits, out);
+    let differences = dispatch!(level(), _simd => {
+        let channels = halved(colors).map(|channel| blurred(&channel, grid.width, wraps));
+        Differences::new(&grid, |a, b, out| color_differences(&channels, a, b, out))
+    });
+    grid.segment(&differences, hits, out);
 }
 
 /// Writes segments of surfaces into an existing image, numbered like those of colours. 0 where nothing is
@@ -52,57 +52,115 @@ pub fn surface_segment_image_into(scene: &Scene<'_>, hits: &Hits, camera: &Camer
     let grid = Grid::new(hits, camera.is_panorama());
     let mut surfaces =
         Surfaces { scene, hits, camera, rays: camera.rays(), planes: FaceCache::new(), grid: &grid };
-    let difference = |a: usize, b: usize| surfaces.difference(a, b);
-    grid.segment(difference, hits, out);
+    let differences = Differences::new(&grid, |a, b, out| {
+        for (i, out) in out.iter_mut().enumerate() {
+            *out = surfaces.difference(a + i, b + i);
+        }
+    });
+    grid.segment(&differences, hits, out);
 }
 
-/// Returns the mean colours of 2 × 2 pixels, rounded. Blocks at the right and lower border may have fewer.
-fn halved(colors: &Raster<[u8; 3]>) -> Raster<[u8; 3]> {
-    let (width, height) = (colors.width(), colors.height());
-    let mut out = Vec::with_capacity(colors.len() / 4 + 1);
-    for y in (0..height).step_by(2) {
-        let (top, bottom) = (colors.row(y), colors.row((y + 1).min(height - 1)));
-        for (top, bottom) in top.chunks(2).zip(bottom.chunks(2)) {
-            let (left, right) = (0, top.len() - 1);
-            out.push(std::array::from_fn(|k| {
-                let sum = u16::from(top[left][k])
-                    + u16::from(top[right][k])
-                    + u16::from(bottom[left][k])
-                    + u16::from(bottom[right][k]);
-                ((sum + 2) / 4) as u8
+/// Returns the mean red, green and blue of 2 × 2 pixels, rounded. Blocks at the right and lower border may
+/// have fewer.
+#[inline(always)]
+fn halved(colors: &Raster<[u8; 3]>) -> [Vec<u8>; 3] {
+    let mut channels = [0; 3].map(|_| Vec::with_capacity(colors.len() / 4 + 1));
+    let mut sums = vec![[0u16; 3]; colors.width() as usize];
+    for y in (0..colors.height()).step_by(2) {
+        let (top, bottom) = (colors.row(y), colors.row((y + 1).min(colors.height() - 1)));
+        let levels = top.as_flattened().iter().zip(bottom.as_flattened());
+        for (sum, (top, bottom)) in sums.as_flattened_mut().iter_mut().zip(levels) {
+            *sum = u16::from(*top) + u16::from(*bottom);
+        }
+        for (k, channel) in channels.iter_mut().enumerate() {
+            channel.extend(sums.chunks(2).map(|pair| {
+                let (left, right) = (pair[0][k], pair[pair.len() - 1][k]);
+                ((left + right + 2) / 4) as u8
             }));
         }
     }
-    Raster::from_vec(width.div_ceil(2), height.div_ceil(2), out)
+    channels
 }
 
-/// Blurs colours by (1, 2, 1) / 4 along rows and columns.
-fn blurred(colors: &Raster<[u8; 3]>, wraps: bool) -> Raster<[u8; 3]> {
-    let (width, height) = (colors.width() as usize, colors.height() as usize);
-    // Sums along rows, times 4.
-    let mut across = Vec::with_capacity(colors.len());
-    for row in colors.rows() {
-        for x in 0..width {
-            let (before, after) = if wraps {
-                ((x + width - 1) % width, (x + 1) % width)
-            } else {
-                (x.saturating_sub(1), (x + 1).min(width - 1))
-            };
-            let (a, b, c) = (row[before], row[x], row[after]);
-            across.push([0, 1, 2].map(|k| u16::from(a[k]) + 2 * u16::from(b[k]) + u16::from(c[k])));
+/// Blurs levels by (1, 2, 1) / 4 along rows and columns.
+#[inline(always)]
+fn blurred(levels: &[u8], width: usize, wraps: bool) -> Vec<u8> {
+    // Sums along rows, times 4. A row has a copy of a neighbour at each end.
+    let mut across = vec![0u16; levels.len()];
+    let mut line = vec![0u8; width + 2];
+    for (levels, out) in levels.chunks_exact(width.max(1)).zip(across.chunks_exact_mut(width.max(1))) {
+        line[1..=width].copy_from_slice(levels);
+        let ends = if wraps { (width - 1, 0) } else { (0, width - 1) };
+        (line[0], line[width + 1]) = (levels[ends.0], levels[ends.1]);
+        let neighbours = line[..width].iter().zip(&line[2..]);
+        for ((out, level), (before, after)) in out.iter_mut().zip(levels).zip(neighbours) {
+            *out = u16::from(*before) + 2 * u16::from(*level) + u16::from(*after);
         }
     }
 
-    let mut out = Vec::with_capacity(colors.len());
-    for y in 0..height {
-        let row = |y: usize| &across[y * width..(y + 1) * width];
-        let rows = row(y.saturating_sub(1))
-            .iter()
-            .zip(row(y))
-            .zip(row((y + 1).min(height - 1)));
-        out.extend(rows.map(|((a, b), c)| [0, 1, 2].map(|k| ((a[k] + 2 * b[k] + c[k] + 8) / 16) as u8)));
+    let mut out = vec![0u8; levels.len()];
+    for start in (0..levels.len()).step_by(width.max(1)) {
+        let row = &across[start..start + width];
+        let above = &across[start.saturating_sub(width)..][..width];
+        let below = across.get(start + width..start + 2 * width).unwrap_or(row);
+        let sums = above.iter().zip(row).zip(below);
+        for (out, ((above, level), below)) in out[start..start + width].iter_mut().zip(sums) {
+            *out = ((above + 2 * level + below + 8) / 16) as u8;
+        }
     }
-    Raster::from_vec(colors.width(), colors.height(), out)
+    out
+}
+
+/// Writes the differences of the colours of nodes from `a` on and from `b` on.
+#[inline(always)]
+fn color_differences(channels: &[Vec<u8>; 3], a: usize, b: usize, out: &mut [u16]) {
+    let count = out.len();
+    let [red, green, blue] = channels;
+    let (red, other_red) = (&red[a..a + count], &red[b..b + count]);
+    let (green, other_green) = (&green[a..a + count], &green[b..b + count]);
+    let (blue, other_blue) = (&blue[a..a + count], &blue[b..b + count]);
+    for (i, out) in out.iter_mut().enumerate() {
+        let r = i32::from(red[i]) - i32::from(other_red[i]);
+        let g = i32::from(green[i]) - i32::from(other_green[i]);
+        let b = i32::from(blue[i]) - i32::from(other_blue[i]);
+        *out = (((r * r + g * g + b * b) as f32).sqrt() + 0.5) as u16;
+    }
+}
+
+/// The difference of each node from the next one in its row, and from the one below; [`NONE`] without one.
+struct Differences {
+    right: Vec<u16>,
+    below: Vec<u16>,
+}
+
+impl Differences {
+    /// `differ` writes those of nodes from one on and from another on.
+    #[inline(always)]
+    fn new(grid: &Grid, mut differ: impl FnMut(usize, usize, &mut [u16])) -> Self {
+        let width = grid.width;
+        let mut right = vec![NONE; grid.face.len()];
+        let mut below = vec![NONE; grid.face.len()];
+        for y in 0..grid.height {
+            let (start, end) = (y * width, (y + 1) * width);
+            let last = end - 1;
+            let mut among = |a: usize, b: usize, out: &mut [u16]| {
+                differ(a, b, out);
+                let faces = grid.face[a..].iter().zip(&grid.face[b..]);
+                for (out, (face, other)) in out.iter_mut().zip(faces) {
+                    *out = if (*face == NO_FACE) | (*other == NO_FACE) { NONE } else { *out };
+                }
+            };
+            among(start, start + 1, &mut right[start..last]);
+            if grid.wraps && width > 2 {
+                // Two columns are neighbours once.
+                among(last, start, &mut right[last..end]);
+            }
+            if y + 1 < grid.height {
+                among(start, end, &mut below[start..end]);
+            }
+        }
+        Self { right, below }
+    }
 }
 
 /// The nodes of an image: one for each 2 × 2 pixels.
@@ -110,8 +168,10 @@ struct Grid {
     width: usize,
     height: usize,
     wraps: bool,
-    /// The first pixel of each node that sees something; `u32::MAX` if none does.
+    /// The first pixel of each node that sees something, or its first one.
     pixel: Vec<u32>,
+    /// The face that it sees.
+    face: Vec<u32>,
 }
 
 impl Grid {
@@ -120,59 +180,60 @@ impl Grid {
         let (width, height) = (full.div_ceil(2), rows.div_ceil(2));
         let faces = hits.face.pixels();
         let mut pixel = Vec::with_capacity(width * height);
+        let mut face = Vec::with_capacity(width * height);
         for y in (0..rows).step_by(2) {
             for x in (0..full).step_by(2) {
                 let first = y * full + x;
                 let right = first + usize::from(x + 1 < full);
                 let below = if y + 1 < rows { full } else { 0 };
                 let four = [first, right, first + below, right + below];
-                let seen = four.into_iter().find(|at| faces[*at] != NO_FACE);
-                pixel.push(seen.map_or(u32::MAX, |at| at as u32));
+                let seen = four.into_iter().find(|at| faces[*at] != NO_FACE).unwrap_or(first);
+                pixel.push(seen as u32);
+                face.push(faces[seen]);
             }
         }
-        Self { width, height, wraps, pixel }
+        Self { width, height, wraps, pixel, face }
     }
 
     /// Segments the nodes by the difference of neighbours, and writes the numbers of segments.
-    fn segment(&self, mut difference: impl FnMut(usize, usize) -> u16, hits: &Hits, out: &mut Raster<u16>) {
+    fn segment(&self, differences: &Differences, hits: &Hits, out: &mut Raster<u16>) {
         fit(out, &hits.face, 0);
         if hits.face.is_empty() {
             return;
         }
 
-        let mut edges = Vec::with_capacity(2 * self.pixel.len());
-        let mut add = |node: usize, other: usize| {
-            if self.pixel[node] != u32::MAX && self.pixel[other] != u32::MAX {
-                edges.push((node as u32, other as u32, difference(node, other).min(MOST)));
+        // What does not differ is joined first in any case, so a graph of these sets is enough.
+        let (set_of_node, count) = self.alike(differences).numbered();
+        let mut sizes = vec![0.0; count];
+        set_of_node.iter().for_each(|set| sizes[*set as usize] += 1.0);
+
+        let mut edges = Vec::new();
+        let mut add = |node: usize, other: usize, difference: u16| {
+            let [a, b] = [set_of_node[node], set_of_node[other]];
+            if a != b {
+                edges.push((a, b, difference));
             }
         };
-        for y in 0..self.height {
-            let start = y * self.width;
-            for node in start..start + self.width {
-                if node + 1 < start + self.width {
-                    add(node, node + 1);
-                } else if self.wraps && self.width > 2 {
-                    // Two columns are neighbours once.
-                    add(node, start);
-                }
-                if y + 1 < self.height {
-                    add(node, node + self.width);
-                }
+        for (node, (right, below)) in differences.right.iter().zip(&differences.below).enumerate() {
+            if (1..NONE).contains(right) {
+                add(node, self.next(node), *right);
+            }
+            if (1..NONE).contains(below) {
+                add(node, node + self.width, *below);
             }
         }
-
         let order = ascending(&edges);
-        let mut sets = segment_graph(vec![1.0; self.pixel.len()], order.iter().copied(), SCALE, FEWEST);
+        let mut sets = segment_graph(sizes, order.iter().copied(), SCALE, FEWEST);
 
-        let mut number_of_root = vec![0u16; self.pixel.len()];
+        let mut number_of_root = vec![0u16; count];
         let mut last = 0u16;
-        let mut numbers = Vec::with_capacity(self.pixel.len());
-        for node in 0..self.pixel.len() {
-            if self.pixel[node] == u32::MAX {
+        let mut numbers = Vec::with_capacity(self.face.len());
+        for (set, face) in set_of_node.iter().zip(&self.face) {
+            if *face == NO_FACE {
                 numbers.push(0);
                 continue;
             }
-            let number = &mut number_of_root[sets.root(node as u32) as usize];
+            let number = &mut number_of_root[sets.root(*set) as usize];
             if *number == 0 {
                 last = last.checked_add(1).unwrap_or(1);
                 *number = last;
@@ -182,17 +243,64 @@ impl Grid {
         self.write(&numbers, hits, out);
     }
 
+    /// Returns the next node in the row of a node.
+    fn next(&self, node: usize) -> usize {
+        if (node + 1).is_multiple_of(self.width) {
+            node + 1 - self.width
+        } else {
+            node + 1
+        }
+    }
+
+    /// Returns the sets of nodes that neighbours without a difference link.
+    fn alike(&self, differences: &Differences) -> DisjointSets {
+        let Differences { right, below } = differences;
+        let width = self.width;
+        let mut sets = DisjointSets::new(self.face.len());
+        for start in (0..self.face.len()).step_by(width) {
+            let mut root = start as u32;
+            for node in start..start + width {
+                let is_like_left = node > start && right[node - 1] == 0;
+                if is_like_left {
+                    sets.join(root, node as u32);
+                } else {
+                    root = node as u32;
+                }
+                if node < width || below[node - width] != 0 {
+                    continue;
+                }
+                // The left one and those above both of them make a ring.
+                let is_linked = is_like_left && below[node - width - 1] == 0 && right[node - width - 1] == 0;
+                if !is_linked {
+                    let above = sets.root((node - width) as u32);
+                    if above != root {
+                        sets.join(above.min(root), above.max(root));
+                        root = above.min(root);
+                    }
+                }
+            }
+            if right[start + width - 1] == 0 {
+                sets.unite(start as u32, (start + width - 1) as u32);
+            }
+        }
+        sets
+    }
+
     /// Writes the numbers of nodes to the pixels that see something.
     fn write(&self, numbers: &[u16], hits: &Hits, out: &mut Raster<u16>) {
         let width = hits.face.width() as usize;
+        let mut twice = vec![[0; 2]; self.width];
         let rows = hits.face.rows().zip(out.pixels_mut().chunks_exact_mut(width));
         for (y, (faces, out)) in rows.enumerate() {
             let numbers = &numbers[y / 2 * self.width..(y / 2 + 1) * self.width];
-            for ((faces, out), number) in faces.chunks(2).zip(out.chunks_mut(2)).zip(numbers) {
-                for (face, out) in faces.iter().zip(out) {
+            dispatch!(level(), _simd => {
+                for (twice, number) in twice.iter_mut().zip(numbers) {
+                    *twice = [*number; 2];
+                }
+                for ((face, out), number) in faces.iter().zip(out).zip(twice.as_flattened()) {
                     *out = if *face == NO_FACE { 0 } else { *number };
                 }
-            }
+            });
         }
     }
 }
@@ -228,12 +336,12 @@ struct Surfaces<'a> {
 
 impl Surfaces<'_> {
     fn difference(&mut self, a: usize, b: usize) -> u16 {
-        let [a, b] = [a, b].map(|node| self.grid.pixel[node] as usize);
-        let faces = [a, b].map(|pixel| self.hits.face.pixels()[pixel]);
-        if faces[0] == faces[1] {
+        let faces = [a, b].map(|node| self.grid.face[node]);
+        if faces[0] == faces[1] || faces.contains(&NO_FACE) {
             return 0;
         }
 
+        let [a, b] = [a, b].map(|node| self.grid.pixel[node] as usize);
         let width = self.hits.face.width() as usize;
         let eye = self.camera.pose.location;
         let rays = [a, b].map(|pixel| self.rays.at((pixel % width) as u32, (pixel / width) as u32));

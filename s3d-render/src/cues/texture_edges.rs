@@ -3,6 +3,7 @@
 use super::gray::PaddedGray;
 use crate::shade::channels::fit;
 use s3d_geom::Raster;
+use s3d_simd::{dispatch, level};
 
 /// The pixels on each side that an edge depends on: four of the blur, one of the derivative.
 const MARGIN: usize = 5;
@@ -22,7 +23,12 @@ pub fn texture_edge_image_into(gray: &Raster<u8>, wraps: bool, out: &mut Raster<
     }
     let width = gray.width() as usize;
     let padded = PaddedGray::new(gray, MARGIN, wraps);
-    let across = blurred_across(&padded);
+    dispatch!(level(), _simd => draw(&padded, width, out));
+}
+
+#[inline(always)]
+fn draw(padded: &PaddedGray, width: usize, out: &mut Raster<u8>) {
+    let across = blurred_across(padded);
     let blurred_width = padded.line - 8;
 
     // Three blurred lines at a time, of levels times 256.
@@ -38,39 +44,48 @@ pub fn texture_edge_image_into(gray: &Raster<u8>, wraps: bool, out: &mut Raster<
 }
 
 /// Blurs along lines. Returns levels times 256, in lines that are 8 pixels shorter.
+#[inline(always)]
 fn blurred_across(padded: &PaddedGray) -> Vec<u16> {
-    let mut out = Vec::with_capacity(padded.levels.len());
-    for line in padded.levels.chunks_exact(padded.line) {
-        out.extend(line.windows(9).map(|w| {
-            let pair = |k: usize| u32::from(w[k]) + u32::from(w[8 - k]);
-            (pair(0) + 8 * pair(1) + 28 * pair(2) + 56 * pair(3) + 70 * u32::from(w[4])) as u16
-        }));
+    let width = padded.line - 8;
+    let mut out = vec![0; padded.levels.len() / padded.line * width];
+    for (line, out) in padded.levels.chunks_exact(padded.line).zip(out.chunks_exact_mut(width)) {
+        let parts: [&[u8]; 9] = std::array::from_fn(|k| &line[k..k + width]);
+        let [a, b, c, d, e, f, g, h, i] = parts;
+        for (x, out) in out.iter_mut().enumerate() {
+            // The weights add up to 256, so 16 bits are enough.
+            let near = 56 * (u16::from(d[x]) + u16::from(f[x])) + 70 * u16::from(e[x]);
+            let far = 8 * (u16::from(b[x]) + u16::from(h[x])) + 28 * (u16::from(c[x]) + u16::from(g[x]));
+            *out = u16::from(a[x]) + u16::from(i[x]) + far + near;
+        }
     }
     out
 }
 
 /// Blurs down the lines from `first` on, and writes levels times 256.
+#[inline(always)]
 fn blur_down(lines: &[u16], width: usize, first: usize, out: &mut [u16]) {
     let line = |k: usize| &lines[(first + k) * width..(first + k + 1) * width];
     let [a, b, c, d, e, f, g, h, i] = std::array::from_fn(line);
     for (x, out) in out.iter_mut().enumerate() {
-        let at = |line: &[u16]| u32::from(line[x]);
-        let sum = (at(a) + at(i)) + 8 * (at(b) + at(h)) + 28 * (at(c) + at(g)) + 56 * (at(d) + at(f));
-        *out = ((sum + 70 * at(e) + 128) >> 8) as u16;
+        let near = 56 * (u32::from(d[x]) + u32::from(f[x])) + 70 * u32::from(e[x]);
+        let far = 8 * (u32::from(b[x]) + u32::from(h[x])) + 28 * (u32::from(c[x]) + u32::from(g[x]));
+        *out = ((u32::from(a[x]) + u32::from(i[x]) + far + near + 128) >> 8) as u16;
     }
 }
 
 /// Writes the strengths of a line from the blurred lines around it.
+#[inline(always)]
 fn magnitudes(lines: &[Vec<u16>; 3], out: &mut [u8]) {
     let [above, at, below] = lines.each_ref().map(Vec::as_slice);
-    let windows = above.windows(3).zip(at.windows(3)).zip(below.windows(3));
-    for (out, ((a, b), c)) in out.iter_mut().zip(windows) {
-        let level = |level: u16| i32::from(level);
-        let right = level(a[2]) + 2 * level(b[2]) + level(c[2]);
-        let left = level(a[0]) + 2 * level(b[0]) + level(c[0]);
-        let top = level(a[0]) + 2 * level(a[1]) + level(a[2]);
-        let bottom = level(c[0]) + 2 * level(c[1]) + level(c[2]);
-        let [h, v] = [(right - left) as f32, (bottom - top) as f32];
+    let width = out.len();
+    let [a, b, c]: [[&[u16]; 3]; 3] =
+        [above, at, below].map(|line| std::array::from_fn(|k| &line[k..k + width]));
+    for (x, out) in out.iter_mut().enumerate() {
+        let (left, right) = (i32::from(a[0][x]) + i32::from(c[0][x]), i32::from(a[2][x]) + i32::from(c[2][x]));
+        let (top, bottom) = (i32::from(a[0][x]) + i32::from(a[2][x]), i32::from(c[0][x]) + i32::from(c[2][x]));
+        let h = right + 2 * i32::from(b[2][x]) - left - 2 * i32::from(b[0][x]);
+        let v = bottom + 2 * i32::from(c[1][x]) - top - 2 * i32::from(a[1][x]);
+        let (h, v) = (h as f32, v as f32);
         // 255 · 4 · m = √(h² + v²) / (256 √2) for levels times 256 and differences times 4.
         let strength = ((h * h + v * v) * (1.0 / 131_072.0)).sqrt();
         *out = (strength + 0.5).min(255.0) as u8;
