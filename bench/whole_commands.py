@@ -15,10 +15,16 @@ import subprocess
 import tempfile
 from pathlib import Path
 
+# What every export has, and the ten cues of Omnidata's annotator.
+USUAL = "rgb,depth,normal,semantic,semantic_pretty,global_xyz,pose"
+CUES = "depth_euclidean,reshading,principal_curvature,edge_occlusion,edge_texture,keypoints2d,keypoints3d"
+CUES += ",segment_unsup2d,segment_unsup25d,mask_valid"
+
 EXPORTS = {
     "without images": ["--views", "0", "--modalities", "pose"],
     "with panoramas": ["--views", "0"],
     "export": [],
+    "with cues": ["--modalities", f"{USUAL},{CUES}"],
 }
 
 
@@ -47,6 +53,7 @@ def turn(s3d, scene, scratch):
     times["= labels and points"] = times["without images"] - times["reading"]
     times["= panoramas"] = times["with panoramas"] - times["without images"]
     times["= images"] = times["export"] - times["without images"]
+    times["= cues"] = times["with cues"] - times["export"]
     return times
 
 

@@ -282,3 +282,28 @@ def test_names_by_room_are_not_those_by_area(demo: Path) -> None:
     assert s3d.NameInArea(str(name)) == str(name) and s3d.NameInArea(str(name)) != name
     assert not {*annotated.names} & {label.name for label in data.labels}
     assert name in {str(name): 1}
+
+
+def test_arguments_that_do_not_fit_are_named(tmp_path: Path, room: s3d.Mesh) -> None:
+    options: Any = {"size": 64.5}
+    with pytest.raises(s3d.UsageError, match=r"^size=64\.5: invalid type"):
+        s3d.export(room, tmp_path / "out", **options)
+    with pytest.raises(s3d.UsageError, match='^allow="everything": must be one of'):
+        s3d.export(room, tmp_path / "out", allow="everything")
+    with pytest.raises(s3d.UsageError, match="^apart=0: must be above 0"):
+        s3d.Scene(room).place_cameras(apart=0)
+    # Any number of 64 bits is a seed.
+    assert len(s3d.sample(room, points=5, seed=2**64 - 1)) == 5
+    with pytest.raises(s3d.UsageError, match="^seed="):
+        s3d.sample(room, points=5, seed=2**64)
+
+
+def test_an_image_of_places_is_projected_as_it_is(demo: Path) -> None:
+    view = s3d.open(demo).views()[0]
+    pixels, depth = view.project(view.xyz)
+    assert pixels.shape == (160, 160, 2) and depth.shape == (160, 160)
+    seen = np.isfinite(view.depth)
+    rows, columns = np.indices((160, 160)) + 0.5
+    # Places are stored as half floats.
+    assert np.abs(pixels[seen] - np.stack([columns, rows], -1)[seen]).max() < 3
+    assert np.abs(depth[seen] - view.depth[seen]).max() < 0.03

@@ -13,6 +13,7 @@ import threading
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import s3d_py as s3d
@@ -118,3 +119,21 @@ def test_ctrl_c_ends_a_long_call() -> None:
     process.send_signal(signal.SIGINT)
     told = process.communicate(timeout=60)[0].split()
     assert process.returncode == 0 and told[-2:] == ["interrupted", "10"]
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+def test_rays_are_cast_in_parts_that_ctrl_c_ends(room: s3d.Mesh) -> None:
+    scene = s3d.Scene(room)
+    ways = np.random.default_rng(1).normal(size=(12_000_000, 3))
+    began = time.monotonic()
+    whole = scene.cast([2, 1.5, 1.2], ways, threads=1)
+    took = time.monotonic() - began
+    # Across the border of two parts.
+    part = slice(2_000_000, 2_300_000)
+    assert np.array_equal(whole.t[part], scene.cast([2, 1.5, 1.2], ways[part]).t)
+
+    threading.Timer(0.1 * took, os.kill, [os.getpid(), signal.SIGINT]).start()
+    began = time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        scene.cast([2, 1.5, 1.2], ways, threads=1)
+    assert time.monotonic() - began < 0.7 * took

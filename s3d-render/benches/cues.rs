@@ -14,6 +14,9 @@ use s3d_render::{
     surface_segment_image_into, texture_edge_image_into, view_images_into,
 };
 
+/// Draws a cue of a camera's hits and colours.
+type Draw<'a> = &'a mut dyn FnMut(&Camera, &Hits, &Raster<[u8; 3]>);
+
 fn cues(c: &mut Criterion) {
     let mut group = c.benchmark_group("cues");
     group.sample_size(10);
@@ -47,7 +50,7 @@ fn cues(c: &mut Criterion) {
             let pixels = shots.iter().map(|(_, hits, _)| hits.face.len() as u64).sum();
             group.throughput(Throughput::Elements(pixels));
 
-            let mut bench = |cue: &str, draw: &mut dyn FnMut(&Camera, &Hits, &Raster<[u8; 3]>)| {
+            let mut bench = |cue: &str, draw: Draw<'_>| {
                 group.bench_function(BenchmarkId::new(format!("{cue}, {what}"), name), |b| {
                     b.iter(|| shots.iter().for_each(|(camera, hits, rgb)| draw(camera, hits, rgb)));
                 });

@@ -72,7 +72,9 @@ fn corners_are_those_of_each_block() {
         let mut levels = std::collections::BTreeMap::new();
         for (x, y, face) in pixels(hits) {
             let block = [x / 4, y / 4];
-            let expected = *levels.entry(block).or_insert_with(|| corner(scene, camera, hits, block));
+            let expected = *levels
+                .entry(block)
+                .or_insert_with(|| corner(scene, camera, hits, block));
             assert_eq!(image.at(x, y), if face == NO_FACE { 0 } else { expected }, "at {x}, {y}");
         }
     });
@@ -84,7 +86,11 @@ fn corner(scene: &Scene<'_>, camera: &Camera, hits: &Hits, [column, row]: [u32; 
     let (columns, rows) = (width.div_ceil(4) as i32, height.div_ceil(4) as i32);
     let rays = camera.rays();
     let sample = |column: i32, row: i32| {
-        let column = if camera.is_panorama() { column.rem_euclid(columns) } else { column.clamp(0, columns - 1) };
+        let column = if camera.is_panorama() {
+            column.rem_euclid(columns)
+        } else {
+            column.clamp(0, columns - 1)
+        };
         let x = (column as u32 * 4 + 2).min(width - 1);
         let y = (row.clamp(0, rows - 1) as u32 * 4 + 2).min(height - 1);
         let (face, depth) = (hits.face.at(x, y), hits.depth.at(x, y));
@@ -93,7 +99,11 @@ fn corner(scene: &Scene<'_>, camera: &Camera, hits: &Hits, [column, row]: [u32; 
         }
         let ray = rays.at(x, y);
         let normal = plane(scene.mesh(), face, camera.pose.location).0.as_vec3();
-        let normal = if normal.dot(ray.as_vec3()) > 0.0 { -normal } else { normal };
+        let normal = if normal.dot(ray.as_vec3()) > 0.0 {
+            -normal
+        } else {
+            normal
+        };
         ((ray * f64::from(depth)).as_vec3(), normal, depth)
     };
 
@@ -132,7 +142,9 @@ fn corner(scene: &Scene<'_>, camera: &Camera, hits: &Hits, [column, row]: [u32; 
 fn segments_of_colours_are_those_of_the_whole_graph() {
     for_each_image(|_, camera, hits| {
         // Colours of faces, so that many neighbours are alike.
-        let colors = hits.face.map(|face| [face as u8 / 3, (face / 700) as u8, if face % 5 == 0 { 90 } else { 0 }]);
+        let colors = hits
+            .face
+            .map(|face| [face as u8 / 3, (face / 700) as u8, if face % 5 == 0 { 90 } else { 0 }]);
         let wraps = camera.is_panorama();
         let image = written(|out| color_segment_image_into(&colors, hits, wraps, out));
         let nodes = blurred(&colors, wraps);
@@ -160,7 +172,8 @@ fn segments_of_surfaces_are_those_of_the_whole_graph() {
             }
             let [from, to] = [from, to].map(|face| plane(scene.mesh(), face, camera.pose.location));
             let side = |(normal, offset): (DVec3, f64)| if offset > 0.0 { -normal } else { normal };
-            let gap = |plane: (DVec3, f64), ray: DVec3, depth: f64| (plane.0.dot(ray) * depth - plane.1).abs();
+            let gap =
+                |plane: (DVec3, f64), ray: DVec3, depth: f64| (plane.0.dot(ray) * depth - plane.1).abs();
             let gap = gap(from, other_ray, other_depth).max(gap(to, ray, depth));
             let turn = (side(from) - side(to)).length();
             (128.0 * turn + 255.0 * 20.0 * gap / depth.min(other_depth) + 0.5).min(511.0) as f32
@@ -172,7 +185,9 @@ fn segments_of_surfaces_are_those_of_the_whole_graph() {
 /// The first pixel of each 2 × 2 that sees something.
 fn seen_pixels(hits: &Hits) -> Vec<Option<(u32, u32)>> {
     let (width, height) = (hits.face.width(), hits.face.height());
-    let nodes = (0..height).step_by(2).flat_map(|y| (0..width).step_by(2).map(move |x| (x, y)));
+    let nodes = (0..height)
+        .step_by(2)
+        .flat_map(|y| (0..width).step_by(2).map(move |x| (x, y)));
     nodes
         .map(|(x, y)| {
             let four = [(x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)];
@@ -187,18 +202,33 @@ fn blurred(colors: &Raster<[u8; 3]>, wraps: bool) -> Vec<[u8; 3]> {
     let (full, rows) = (colors.width(), colors.height());
     let (width, height) = (full.div_ceil(2) as i32, rows.div_ceil(2) as i32);
     let mean = |x: i32, y: i32, k: usize| {
-        let x = if wraps { x.rem_euclid(width) } else { x.clamp(0, width - 1) } as u32 * 2;
+        let x = if wraps {
+            x.rem_euclid(width)
+        } else {
+            x.clamp(0, width - 1)
+        } as u32
+            * 2;
         let y = y.clamp(0, height - 1) as u32 * 2;
         let (right, below) = ((x + 1).min(full - 1), (y + 1).min(rows - 1));
         let four = [(x, y), (right, y), (x, below), (right, below)];
-        (four.into_iter().map(|(x, y)| u32::from(colors.at(x, y)[k])).sum::<u32>() + 2) / 4
+        (four
+            .into_iter()
+            .map(|(x, y)| u32::from(colors.at(x, y)[k]))
+            .sum::<u32>()
+            + 2)
+            / 4
     };
     let weights = [(-1, 1), (0, 2), (1, 1)];
     let nodes = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
     nodes
         .map(|(x, y)| {
             [0, 1, 2].map(|k| {
-                let across = |y: i32| weights.iter().map(|(dx, weight)| weight * mean(x + dx, y, k)).sum::<u32>();
+                let across = |y: i32| {
+                    weights
+                        .iter()
+                        .map(|(dx, weight)| weight * mean(x + dx, y, k))
+                        .sum::<u32>()
+                };
                 let sum: u32 = weights.iter().map(|(dy, weight)| weight * across(y + dy)).sum();
                 ((sum + 8) / 16) as u8
             })
@@ -214,7 +244,11 @@ fn segments(hits: &Hits, wraps: bool, mut difference: impl FnMut(usize, usize) -
     let mut edges = Vec::new();
     for node in 0..width * height {
         let (x, y) = (node % width, node / width);
-        let right = if x + 1 < width { Some(node + 1) } else { (wraps && width > 2).then_some(node + 1 - width) };
+        let right = if x + 1 < width {
+            Some(node + 1)
+        } else {
+            (wraps && width > 2).then_some(node + 1 - width)
+        };
         let below = (y + 1 < height).then_some(node + width);
         for other in [right, below].into_iter().flatten() {
             if seen[node].is_some() && seen[other].is_some() {

@@ -349,7 +349,11 @@ fn in_parts<T: Send>(
 
 /// The rays or points of a part. One origin is that of all rays.
 fn of_part<'a, T>(all: &'a [T], part: &Range<usize>) -> &'a [T] {
-    if all.len() == 1 { all } else { all.get(part.clone()).unwrap_or_default() }
+    if all.len() == 1 {
+        all
+    } else {
+        all.get(part.clone()).unwrap_or_default()
+    }
 }
 
 /// The bytes of a pixel's hit: its face and its depth.

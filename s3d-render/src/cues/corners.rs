@@ -90,8 +90,6 @@ struct Sums {
 
 impl Samples {
     fn new(scene: &Scene<'_>, hits: &Hits, camera: &Camera, pixels_per_m: f32) -> Self {
-        let nearest = hits.depth.pixels().iter().fold(f32::INFINITY, |a, b| if *b < a { *b } else { a });
-        let margin = REACH.saturating_mul(step(nearest, pixels_per_m)).min(MOST_MARGIN);
         let (width, height) = (hits.face.width(), hits.face.height());
         let block = BLOCK as u32;
         let (columns, rows) = (width.div_ceil(block), height.div_ceil(block));
@@ -101,11 +99,17 @@ impl Samples {
         let wraps = camera.is_panorama();
         let (mut points, mut normals) = <([Vec<f32>; 3], [Vec<f32>; 3])>::default();
         let mut row_values: [Vec<f32>; 6] = Default::default();
+        let middle = |block_at: u32, size: u32| (block_at * block + block / 2).min(size - 1);
         let mut depths = Vec::with_capacity(columns as usize * rows as usize);
-        for row in 0..rows {
-            let y = (row * block + block / 2).min(height - 1);
-            for column in 0..columns {
-                let x = (column * block + block / 2).min(width - 1);
+        for y in (0..rows).map(|row| middle(row, height)) {
+            let row = hits.depth.row(y);
+            depths.extend((0..columns).map(|column| row[middle(column, width) as usize]));
+        }
+        let nearest = depths.iter().fold(f32::INFINITY, |a, b| a.min(*b));
+        let margin = REACH.saturating_mul(step(nearest, pixels_per_m)).min(MOST_MARGIN);
+
+        for y in (0..rows).map(|row| middle(row, height)) {
+            for x in (0..columns).map(|column| middle(column, width)) {
                 let (face, depth) = (hits.face.at(x, y), hits.depth.at(x, y));
                 let (point, normal) = if face == NO_FACE {
                     (Vec3::ZERO, Vec3::ZERO)
@@ -118,7 +122,6 @@ impl Samples {
                 };
                 let values = point.to_array().into_iter().chain(normal.to_array());
                 row_values.iter_mut().zip(values).for_each(|(of, value)| of.push(value));
-                depths.push(if face == NO_FACE { f32::INFINITY } else { depth });
             }
 
             for (of, values) in points.iter_mut().chain(&mut normals).zip(&mut row_values) {
@@ -132,7 +135,15 @@ impl Samples {
         // The last blocks are looked at with some that are not there.
         let all = points.iter_mut().chain(&mut normals);
         all.for_each(|column| column.extend([0.0; TOGETHER]));
-        Self { columns: columns as usize, rows: rows as usize, points, normals, depths, margin: margin as usize, wraps }
+        Self {
+            columns: columns as usize,
+            rows: rows as usize,
+            points,
+            normals,
+            depths,
+            margin: margin as usize,
+            wraps,
+        }
     }
 
     /// Returns where the points and normals of a row begin, behind its margin. Rows beyond a border are the one
@@ -157,7 +168,11 @@ impl Samples {
             }
             let apart = step(self.depths[start + column], pixels_per_m);
             // Beyond the margin, samples are not next to each other.
-            let most = if (REACH * apart) as usize > self.margin { 1 } else { TOGETHER.min(self.columns - column) };
+            let most = if (REACH * apart) as usize > self.margin {
+                1
+            } else {
+                TOGETHER.min(self.columns - column)
+            };
             let mut count = 1;
             while count < most && step(self.depths[start + column + count], pixels_per_m) == apart {
                 count += 1;
@@ -172,8 +187,7 @@ impl Samples {
     fn levels(&self, row: usize, column: usize, step: i32, levels: &mut [u8]) {
         let row = row as i32;
         let middle = self.row(row) + column;
-        let mut sums =
-            Sums { squares: [[0.0; TOGETHER]; 6], counts: [0.0; TOGETHER], bends: [0; TOGETHER] };
+        let mut sums = Sums { squares: [[0.0; TOGETHER]; 6], counts: [0.0; TOGETHER], bends: [0; TOGETHER] };
         for dy in -REACH..=REACH {
             let start = self.row(row + dy * step);
             for dx in -REACH..=REACH {
@@ -199,7 +213,11 @@ impl Samples {
             let shown = (255.0 * interest + 0.5).min(255.0) as u8;
             *level = if sums.bends[i] == 0 { 0 } else { shown };
         }
-        for ((level, found), depth) in levels.iter_mut().zip(&found).zip(&self.depths[row as usize * self.columns + column..]) {
+        for ((level, found), depth) in levels
+            .iter_mut()
+            .zip(&found)
+            .zip(&self.depths[row as usize * self.columns + column..])
+        {
             *level = if *depth == f32::INFINITY { 0 } else { *found };
         }
     }
@@ -251,5 +269,9 @@ fn column_at(column: i32, columns: usize, wraps: bool) -> usize {
 fn lanes(columns: &[Vec<f32>; 3], at: usize) -> [&[f32; TOGETHER]; 3] {
     let none = &[0.0; TOGETHER];
     let [x, y, z] = columns;
-    [x[at..].first_chunk().unwrap_or(none), y[at..].first_chunk().unwrap_or(none), z[at..].first_chunk().unwrap_or(none)]
+    [
+        x[at..].first_chunk().unwrap_or(none),
+        y[at..].first_chunk().unwrap_or(none),
+        z[at..].first_chunk().unwrap_or(none),
+    ]
 }

@@ -123,7 +123,11 @@ impl BoxSums {
                 .wrapping_sub(sum(&lower_left, n));
             let (xx, yy, xy) = (xx as i32 as f32 * scale, yy as i32 as f32 * scale, xy as i32 as f32 * scale);
             let determinant = xx * yy - MIXED * xy * xy;
-            *response = if determinant > *response { determinant } else { *response };
+            *response = if determinant > *response {
+                determinant
+            } else {
+                *response
+            };
         }
     }
 }

@@ -53,8 +53,13 @@ pub fn surface_segment_image_into(scene: &Scene<'_>, hits: &Hits, camera: &Camer
     let mut surfaces =
         Surfaces { scene, hits, camera, rays: camera.rays(), planes: FaceCache::new(), grid: &grid };
     let differences = Differences::new(&grid, |a, b, out| {
-        for (i, out) in out.iter_mut().enumerate() {
-            *out = surfaces.difference(a + i, b + i);
+        let faces = grid.face[a..].iter().zip(&grid.face[b..]);
+        for (i, (out, (face, other))) in out.iter_mut().zip(faces).enumerate() {
+            *out = if face == other {
+                0
+            } else {
+                surfaces.difference(a + i, b + i)
+            };
         }
     });
     grid.segment(&differences, hits, out);
@@ -88,7 +93,10 @@ fn blurred(levels: &[u8], width: usize, wraps: bool) -> Vec<u8> {
     // Sums along rows, times 4. A row has a copy of a neighbour at each end.
     let mut across = vec![0u16; levels.len()];
     let mut line = vec![0u8; width + 2];
-    for (levels, out) in levels.chunks_exact(width.max(1)).zip(across.chunks_exact_mut(width.max(1))) {
+    for (levels, out) in levels
+        .chunks_exact(width.max(1))
+        .zip(across.chunks_exact_mut(width.max(1)))
+    {
         line[1..=width].copy_from_slice(levels);
         let ends = if wraps { (width - 1, 0) } else { (0, width - 1) };
         (line[0], line[width + 1]) = (levels[ends.0], levels[ends.1]);
@@ -140,59 +148,67 @@ impl Differences {
         let width = grid.width;
         let mut right = vec![NONE; grid.face.len()];
         let mut below = vec![NONE; grid.face.len()];
-        for y in 0..grid.height {
-            let (start, end) = (y * width, (y + 1) * width);
-            let last = end - 1;
-            let mut among = |a: usize, b: usize, out: &mut [u16]| {
-                differ(a, b, out);
-                let faces = grid.face[a..].iter().zip(&grid.face[b..]);
-                for (out, (face, other)) in out.iter_mut().zip(faces) {
-                    *out = if (*face == NO_FACE) | (*other == NO_FACE) { NONE } else { *out };
-                }
-            };
-            among(start, start + 1, &mut right[start..last]);
+        for start in (0..grid.face.len()).step_by(width.max(1)) {
+            let (last, end) = (start + width - 1, start + width);
+            differ(start, start + 1, &mut right[start..last]);
+            hide_unseen(&grid.face[start..], &grid.face[start + 1..], &mut right[start..last]);
             if grid.wraps && width > 2 {
                 // Two columns are neighbours once.
-                among(last, start, &mut right[last..end]);
+                differ(last, start, &mut right[last..end]);
+                hide_unseen(&grid.face[last..], &grid.face[start..], &mut right[last..end]);
             }
-            if y + 1 < grid.height {
-                among(start, end, &mut below[start..end]);
+            if end < grid.face.len() {
+                differ(start, end, &mut below[start..end]);
+                hide_unseen(&grid.face[start..], &grid.face[end..], &mut below[start..end]);
             }
         }
         Self { right, below }
     }
 }
 
+/// Writes [`NONE`] where one of two nodes sees nothing.
+#[inline(always)]
+fn hide_unseen(faces: &[u32], others: &[u32], out: &mut [u16]) {
+    for (out, (face, other)) in out.iter_mut().zip(faces.iter().zip(others)) {
+        *out = if (*face == NO_FACE) | (*other == NO_FACE) {
+            NONE
+        } else {
+            *out
+        };
+    }
+}
+
 /// The nodes of an image: one for each 2 × 2 pixels.
 struct Grid {
     width: usize,
-    height: usize,
     wraps: bool,
-    /// The first pixel of each node that sees something, or its first one.
-    pixel: Vec<u32>,
-    /// The face that it sees.
+    /// The face that the first pixel of each node sees that sees something, or [`NO_FACE`].
     face: Vec<u32>,
 }
 
 impl Grid {
     fn new(hits: &Hits, wraps: bool) -> Self {
-        let (full, rows) = (hits.face.width() as usize, hits.face.height() as usize);
-        let (width, height) = (full.div_ceil(2), rows.div_ceil(2));
-        let faces = hits.face.pixels();
-        let mut pixel = Vec::with_capacity(width * height);
-        let mut face = Vec::with_capacity(width * height);
-        for y in (0..rows).step_by(2) {
-            for x in (0..full).step_by(2) {
-                let first = y * full + x;
-                let right = first + usize::from(x + 1 < full);
-                let below = if y + 1 < rows { full } else { 0 };
-                let four = [first, right, first + below, right + below];
-                let seen = four.into_iter().find(|at| faces[*at] != NO_FACE).unwrap_or(first);
-                pixel.push(seen as u32);
-                face.push(faces[seen]);
+        let width = hits.face.width().div_ceil(2) as usize;
+        let mut face = Vec::with_capacity(width * hits.face.height().div_ceil(2) as usize);
+        for y in (0..hits.face.height()).step_by(2) {
+            let (top, bottom) = (hits.face.row(y), hits.face.row((y + 1).min(hits.face.height() - 1)));
+            for (top, bottom) in top.chunks(2).zip(bottom.chunks(2)) {
+                let seen = top.iter().chain(bottom).find(|face| **face != NO_FACE);
+                face.push(seen.copied().unwrap_or(NO_FACE));
             }
         }
-        Self { width, height, wraps, pixel, face }
+        Self { width, wraps, face }
+    }
+
+    /// Returns the first pixel of a node that sees something: its column, row and place.
+    fn pixel(&self, node: usize, hits: &Hits) -> (u32, u32, usize) {
+        let (full, rows) = (hits.face.width() as usize, hits.face.height() as usize);
+        let (x, y) = (node % self.width * 2, node / self.width * 2);
+        let (right, below) = ((x + 1).min(full - 1), (y + 1).min(rows - 1));
+        let four = [(x, y), (right, y), (x, below), (right, below)].map(|(x, y)| (x, y, y * full + x));
+        let seen = four.iter().find(|(.., at)| hits.face.pixels()[*at] != NO_FACE);
+        let (x, y, at) = *seen.unwrap_or(&four[0]);
+        (x as u32, y as u32, at)
     }
 
     /// Segments the nodes by the difference of neighbours, and writes the numbers of segments.
@@ -203,27 +219,12 @@ impl Grid {
         }
 
         // What does not differ is joined first in any case, so a graph of these sets is enough.
-        let (set_of_node, count) = self.alike(differences).numbered();
+        let (set_of_node, count) = self.alike(differences);
         let mut sizes = vec![0.0; count];
         set_of_node.iter().for_each(|set| sizes[*set as usize] += 1.0);
 
-        let mut edges = Vec::new();
-        let mut add = |node: usize, other: usize, difference: u16| {
-            let [a, b] = [set_of_node[node], set_of_node[other]];
-            if a != b {
-                edges.push((a, b, difference));
-            }
-        };
-        for (node, (right, below)) in differences.right.iter().zip(&differences.below).enumerate() {
-            if (1..NONE).contains(right) {
-                add(node, self.next(node), *right);
-            }
-            if (1..NONE).contains(below) {
-                add(node, node + self.width, *below);
-            }
-        }
-        let order = ascending(&edges);
-        let mut sets = segment_graph(sizes, order.iter().copied(), SCALE, FEWEST);
+        let order = Ascending::new(|then| self.for_each_edge(differences, &set_of_node, then));
+        let mut sets = segment_graph(sizes, order.edges(), SCALE, FEWEST);
 
         let mut number_of_root = vec![0u16; count];
         let mut last = 0u16;
@@ -243,6 +244,30 @@ impl Grid {
         self.write(&numbers, hits, out);
     }
 
+    /// Calls `then` with the two sets of each edge between sets, and their difference.
+    fn for_each_edge(
+        &self,
+        differences: &Differences,
+        set_of_node: &[u32],
+        then: &mut dyn FnMut([u32; 2], u16),
+    ) {
+        let between = differences.right.iter().zip(&differences.below);
+        for ((node, set), (right, below)) in set_of_node.iter().enumerate().zip(between) {
+            if (1..NONE).contains(right) {
+                let other = set_of_node[self.next(node)];
+                if *set != other {
+                    then([*set, other], *right);
+                }
+            }
+            if (1..NONE).contains(below) {
+                let other = set_of_node[node + self.width];
+                if *set != other {
+                    then([*set, other], *below);
+                }
+            }
+        }
+    }
+
     /// Returns the next node in the row of a node.
     fn next(&self, node: usize) -> usize {
         if (node + 1).is_multiple_of(self.width) {
@@ -252,38 +277,37 @@ impl Grid {
         }
     }
 
-    /// Returns the sets of nodes that neighbours without a difference link.
-    fn alike(&self, differences: &Differences) -> DisjointSets {
+    /// Returns the set of each node, and how many there are: neighbours without a difference are in one.
+    fn alike(&self, differences: &Differences) -> (Vec<u32>, usize) {
         let Differences { right, below } = differences;
         let width = self.width;
-        let mut sets = DisjointSets::new(self.face.len());
-        for start in (0..self.face.len()).step_by(width) {
-            let mut root = start as u32;
+        // Nodes of a row that are alike are one run.
+        let mut runs = DisjointSets::default();
+        let mut of_node = vec![0; self.face.len()];
+        for start in (0..of_node.len()).step_by(width) {
+            let mut run = 0;
             for node in start..start + width {
                 let is_like_left = node > start && right[node - 1] == 0;
-                if is_like_left {
-                    sets.join(root, node as u32);
-                } else {
-                    root = node as u32;
+                if !is_like_left {
+                    run = runs.add();
                 }
-                if node < width || below[node - width] != 0 {
-                    continue;
-                }
-                // The left one and those above both of them make a ring.
-                let is_linked = is_like_left && below[node - width - 1] == 0 && right[node - width - 1] == 0;
-                if !is_linked {
-                    let above = sets.root((node - width) as u32);
-                    if above != root {
-                        sets.join(above.min(root), above.max(root));
-                        root = above.min(root);
+                of_node[node] = run;
+                if node >= width && below[node - width] == 0 {
+                    // The left one and those above both of them make a ring.
+                    let above = node - width;
+                    if !(is_like_left && below[above - 1] == 0 && right[above - 1] == 0) {
+                        runs.unite(run, of_node[above]);
                     }
                 }
             }
             if right[start + width - 1] == 0 {
-                sets.unite(start as u32, (start + width - 1) as u32);
+                runs.unite(of_node[start], run);
             }
         }
-        sets
+
+        let (set_of_run, count) = runs.numbered();
+        of_node.iter_mut().for_each(|run| *run = set_of_run[*run as usize]);
+        (of_node, count)
     }
 
     /// Writes the numbers of nodes to the pixels that see something.
@@ -305,23 +329,38 @@ impl Grid {
     }
 }
 
-/// Returns edges from the smallest difference on; equal ones in their order. Differences are small numbers,
-/// so counting sorts them.
-fn ascending(edges: &[(u32, u32, u16)]) -> Vec<([u32; 2], f32)> {
-    let mut starts = vec![0u32; usize::from(MOST) + 2];
-    for (_, _, difference) in edges {
-        starts[usize::from(*difference) + 1] += 1;
+/// Edges by their difference; equal ones in their order. Differences are small numbers, so counting sorts them.
+struct Ascending {
+    /// Where the edges of each difference end.
+    ends: Vec<u32>,
+    nodes: Vec<[u32; 2]>,
+}
+
+impl Ascending {
+    /// `for_each` calls a function with each edge; it is asked twice.
+    fn new(for_each: impl Fn(&mut dyn FnMut([u32; 2], u16))) -> Self {
+        let mut ends = vec![0u32; usize::from(MOST) + 2];
+        for_each(&mut |_, difference| ends[usize::from(difference) + 1] += 1);
+        for k in 1..ends.len() {
+            ends[k] += ends[k - 1];
+        }
+        let mut nodes = vec![[0; 2]; ends.last().map_or(0, |count| *count as usize)];
+        for_each(&mut |edge, difference| {
+            let place = &mut ends[usize::from(difference)];
+            nodes[*place as usize] = edge;
+            *place += 1;
+        });
+        Self { ends, nodes }
     }
-    for k in 1..starts.len() {
-        starts[k] += starts[k - 1];
+
+    fn edges(&self) -> impl Iterator<Item = ([u32; 2], f32)> {
+        let mut start = 0;
+        self.ends.iter().enumerate().flat_map(move |(difference, end)| {
+            let nodes = &self.nodes[start..*end as usize];
+            start = *end as usize;
+            nodes.iter().map(move |nodes| (*nodes, difference as f32))
+        })
     }
-    let mut order = vec![([0; 2], 0.0); edges.len()];
-    for (node, other, difference) in edges {
-        let place = &mut starts[usize::from(*difference)];
-        order[*place as usize] = ([*node, *other], f32::from(*difference));
-        *place += 1;
-    }
-    order
 }
 
 /// The differences of surfaces.
@@ -337,15 +376,14 @@ struct Surfaces<'a> {
 impl Surfaces<'_> {
     fn difference(&mut self, a: usize, b: usize) -> u16 {
         let faces = [a, b].map(|node| self.grid.face[node]);
-        if faces[0] == faces[1] || faces.contains(&NO_FACE) {
-            return 0;
+        if faces.contains(&NO_FACE) {
+            return NONE;
         }
 
-        let [a, b] = [a, b].map(|node| self.grid.pixel[node] as usize);
-        let width = self.hits.face.width() as usize;
         let eye = self.camera.pose.location;
-        let rays = [a, b].map(|pixel| self.rays.at((pixel % width) as u32, (pixel / width) as u32));
-        let depths = [a, b].map(|pixel| f64::from(self.hits.depth.pixels()[pixel]));
+        let pixels = [a, b].map(|node| self.grid.pixel(node, self.hits));
+        let rays = pixels.map(|(x, y, _)| self.rays.at(x, y));
+        let depths = pixels.map(|(.., at)| f64::from(self.hits.depth.pixels()[at]));
         let [from, to] =
             faces.map(|face| *self.planes.get(face, || Plane::new(self.scene.mesh(), face, eye)));
         let side = |plane: Plane| {

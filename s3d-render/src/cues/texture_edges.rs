@@ -81,8 +81,10 @@ fn magnitudes(lines: &[Vec<u16>; 3], out: &mut [u8]) {
     let [a, b, c]: [[&[u16]; 3]; 3] =
         [above, at, below].map(|line| std::array::from_fn(|k| &line[k..k + width]));
     for (x, out) in out.iter_mut().enumerate() {
-        let (left, right) = (i32::from(a[0][x]) + i32::from(c[0][x]), i32::from(a[2][x]) + i32::from(c[2][x]));
-        let (top, bottom) = (i32::from(a[0][x]) + i32::from(a[2][x]), i32::from(c[0][x]) + i32::from(c[2][x]));
+        let (left, right) =
+            (i32::from(a[0][x]) + i32::from(c[0][x]), i32::from(a[2][x]) + i32::from(c[2][x]));
+        let (top, bottom) =
+            (i32::from(a[0][x]) + i32::from(a[2][x]), i32::from(c[0][x]) + i32::from(c[2][x]));
         let h = right + 2 * i32::from(b[2][x]) - left - 2 * i32::from(b[0][x]);
         let v = bottom + 2 * i32::from(c[1][x]) - top - 2 * i32::from(a[1][x]);
         let (h, v) = (h as f32, v as f32);
