@@ -2,6 +2,7 @@
 
 use crate::common;
 use common::{copyroom, files, s3d_ok, text, write_scan};
+use s3d_io::dataset::Domain;
 use std::path::Path;
 use std::process::Command;
 
@@ -71,6 +72,7 @@ fn instructions_change_no_byte() {
             .arg("-o")
             .arg(&out)
             .args(SMALL)
+            .args(["--modalities", &Domain::ALL.map(|domain| domain.to_string()).join(",")])
             .output()
             .unwrap();
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));

@@ -1,4 +1,5 @@
-//! Cues that are made in wide registers, or by way of a smaller graph, against their definitions pixel by pixel.
+//! Cues that are made in wide registers, or by way of a smaller graph, against their definitions pixel by
+//! pixel.
 
 use s3d_geom::glam::{DVec3, Vec3, dvec3};
 use s3d_geom::{Camera, Pose, Raster, TriMesh};
@@ -8,7 +9,7 @@ use s3d_render::{
 };
 use s3d_synth::scenes::scan_like;
 
-/// Calls `check` with images of a scan: of an odd size, near a wall, of panoramas, and partly beside the scan.
+/// Calls `check` with images of a scan: of odd sizes, near a wall, of panoramas, and partly beside the scan.
 fn for_each_image(mut check: impl FnMut(&Scene<'_>, &Camera, &Hits)) {
     let mesh = scan_like(20_000, 3);
     let scene = Scene::new(&mesh);

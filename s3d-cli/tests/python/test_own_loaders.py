@@ -1,8 +1,8 @@
 """Reads packages with the loaders of other projects themselves, as they are.
 
 `S3D_LOADERS` names a folder with checkouts of their repositories: `dust3r`, `must3r`, `map-anything`, `vggt` and
-`Pointcept`. They need torch and torchvision; what each needs besides is skipped by name where it is missing. Other tests
-read the same files by the rules of these loaders, and need none of it.
+`Pointcept`. They need torch and torchvision; what each needs besides is skipped by name where it is missing. Other
+tests read the same files by the rules of these loaders, and need none of it.
 """
 
 import importlib
@@ -173,10 +173,10 @@ def test_concerto(loader, concerto, monkeypatch):
 
 
 def test_concerto_prepares_its_own(concerto):
-    """Their preprocessing of 2D-3D-S makes the same rooms, and correspondences that are as near as it means them to be.
+    """Their preprocessing of 2D-3D-S makes the same rooms, and correspondences as near as it means them to be.
 
-    It goes along the ray of a pixel's corner as far as the surface is along that of its centre; within 1 cm of there lie
-    its points.
+    It goes along the ray of a pixel's corner as far as the surface is along that of its centre. Its points lie
+    within 1 cm of there.
     """
     place = os.environ.get("S3D_LOADERS") or pytest.skip("S3D_LOADERS names no checkouts of loaders")
     script = Path(place).resolve() / "Pointcept/pointcept/datasets/preprocessing/concerto/s3dis/preprocess_s3dis.py"

@@ -321,9 +321,9 @@ fn rays(
     Ok((origins, directions))
 }
 
-/// Calls `call` with parts of so many rays or points, without Python's lock, and joins what it finds. A few are
-/// looked at on this thread, since they take less time than the start of another. Between two parts, Python may
-/// raise an exception, such as that of Ctrl-C.
+/// Calls `call` with parts of so many rays or points, without Python's lock, and joins what it finds. A few
+/// are looked at on this thread, since they take less time than the start of another. Between two parts,
+/// Python may raise an exception, such as that of Ctrl-C.
 fn in_parts<T: Send>(
     py: Python<'_>,
     threads: Option<usize>,

@@ -61,9 +61,9 @@ pub fn corner_image_into(scene: &Scene<'_>, hits: &Hits, camera: &Camera, out: &
     });
 }
 
-/// A sample for each block, by column: the point relative to the camera, the normal of its face, and its depth,
-/// which is infinite where nothing is seen. Each row has a margin on both sides: those of the other side of a
-/// panorama, and repeated samples elsewhere.
+/// A sample for each block, by column: the point relative to the camera, the normal of its face, and its
+/// depth, which is infinite where nothing is seen. Each row of points and normals has a margin on both sides:
+/// samples of the other side of a panorama, and repeated ones elsewhere.
 struct Samples {
     columns: usize,
     rows: usize,
@@ -146,8 +146,8 @@ impl Samples {
         }
     }
 
-    /// Returns where the points and normals of a row begin, behind its margin. Rows beyond a border are the one
-    /// at it.
+    /// Returns where the points and normals of a row begin, behind its margin. Rows beyond a border are the
+    /// one at it.
     #[inline(always)]
     fn row(&self, row: i32) -> usize {
         let row = row.clamp(0, self.rows as i32 - 1) as usize;

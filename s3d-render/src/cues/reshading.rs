@@ -51,7 +51,8 @@ pub fn reshading_image_into(scene: &Scene<'_>, hits: &Hits, camera: &Camera, out
             for (((face, depth), (length, offset)), out) in faces.iter().zip(depths).zip(planes).zip(out) {
                 // The cosine is the plane's distance over the point's.
                 let distance = f64::from(*depth) * length;
-                let light = 255.0 * ENERGY * HALF_LIFE * offset / (distance * (HALF_LIFE + distance * distance));
+                let falloff = distance * (HALF_LIFE + distance * distance);
+                let light = 255.0 * ENERGY * HALF_LIFE * offset / falloff;
                 let level = rounded_down(light + 0.5, 255.0).max(1) as u8;
                 *out = if *face == NO_FACE { 0 } else { level };
             }

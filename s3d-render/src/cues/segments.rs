@@ -329,7 +329,8 @@ impl Grid {
     }
 }
 
-/// Edges by their difference; equal ones in their order. Differences are small numbers, so counting sorts them.
+/// Edges by their difference; equal ones in their order. Differences are small numbers, so counting sorts
+/// them.
 struct Ascending {
     /// Where the edges of each difference end.
     ends: Vec<u32>,
