@@ -1,6 +1,7 @@
 //! The arctangent as a polynomial, for kernels that compute it for several numbers at once.
 
-/// The coefficients of a polynomial p in a², the highest power first: atan(a) is a · p(a²) for a from 0 to 1.
+/// The coefficients of a polynomial p in a², the highest power first: atan(a) is a · p(a²), from
+/// 0 to 1.
 ///
 /// They minimise the largest error, 4e-8, to which single precision adds its own.
 ///

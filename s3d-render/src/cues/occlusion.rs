@@ -12,7 +12,7 @@ use s3d_simd::{dispatch, level};
 const STEP_M: f64 = 0.01;
 /// The same as a share of the depth.
 const STEP_SHARE: f64 = 0.005;
-/// No smaller step is an edge in 32 bits either, whatever their rounding.
+/// A little less than [`STEP_M`]: a step that 32 bits show as no more is no edge, whatever their rounding.
 const LEAST_STEP_M: f32 = 0.009_99;
 /// The cosine between ray and normal below which a plane leaves the image too steeply to tell where its
 /// surface goes on.

@@ -1,4 +1,4 @@
-//! The planes of faces, the lengths of rays, and whole numbers.
+//! The planes of faces, the lengths of rays, and rounding.
 
 use glam::DVec3;
 use s3d_geom::{Camera, Rays, TriMesh};

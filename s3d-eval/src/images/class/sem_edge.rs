@@ -14,8 +14,8 @@ const DEFINITION: [&str; 5] = [
      either side.",
     "A pixel is on the boundary of a class if it has the class and one of its neighbours at the right, \
      below, and below at the right has not, or the other way round.",
-    "A predicted boundary pixel is right if the truth has one of the class at most ⌈0.008 · diagonal⌉ pixels \
-     away; a true one is found in the same way. Precision and recall are shares of these; F is their \
+    "A predicted boundary pixel is right if the truth has one of the class at most ⌈0.008 · diagonal⌉ \
+     pixels away; a true one is found in the same way. Precision and recall are shares of these; F is their \
      harmonic mean. If only one side has boundaries, F is 0; if neither has, 1.",
     "Scores of a class are means over the images in which truth or prediction has it; the row `mean` is over \
      classes.",

@@ -47,8 +47,8 @@ const MARIGOLD: [&str; 4] = [
      are evaluated: the script's limits for NYUv2 and ScanNet. Predictions are clamped to the same limits.",
     "Scores are computed for each image; the table has their mean over images.",
     "δ is the larger of prediction ÷ truth and truth ÷ prediction. RMSE ln is of natural logarithms, \
-     log10 the mean error of decimal ones. iRMSE is of 1 ÷ depth. SILog is the standard deviation of errors of \
-     natural logarithms.",
+     log10 the mean error of decimal ones. iRMSE is of 1 ÷ depth. SILog is the standard deviation of \
+     errors of natural logarithms.",
     "As in Marigold's script/depth/eval.py (commit b1dffaaa), which computes in 32 bits; here it is 64.",
 ];
 
