@@ -106,7 +106,7 @@ pub use columns::{ColumnsError, MeshColumns};
 pub use decimate::{DecimateError, DecimateOptions, Decimated, decimate, decimate_while};
 pub use error::FusionError;
 pub use extract::{FusedMesh, Surface};
-pub use fusion::{Fusion, FusionOptions, Tile};
+pub use fusion::{Fusion, FusionOptions, PreparedImage, Preparer, Tile};
 pub use noise::SensorNoise;
 pub use origin::{FoundOrigin, OriginError, find_origin};
 pub use range_image::{RangeImage, RangeKind};

@@ -1,13 +1,13 @@
 //! Images are gathered in one grid, or in the grids of tiles if one does not fit into the memory.
 
-use super::images::{Images, Seen};
+use super::images::{Images, Rays, Seen};
 use super::kept::Record;
 use super::kept_tiles::KeptTiles;
 use super::{FuseOptions, tiles};
 use crate::context::Context;
 use crate::error::{Error, Result};
 use crate::memory;
-use s3d_fusion::{FusedMesh, Fusion, FusionError, SensorNoise, Surface};
+use s3d_fusion::{FusedMesh, Fusion, FusionError, PreparedImage, SensorNoise, Surface};
 use std::path::{Path, PathBuf};
 
 /// Where finished tiles are kept, and what they are made of.
@@ -82,16 +82,38 @@ pub(super) fn gather(
 /// Adds all images to a grid. Returns `None` if it becomes too large.
 fn fill(mut grid: Fusion, images: &Images, most_bytes: u64, ctx: &Context) -> Result<Option<Fusion>> {
     let task = ctx.progress("fusing", images.unit(), images.len() as u64);
+    let unfit = |of: &Path, e: FusionError| Error::unfit(of, e.to_string());
+    let preparer = grid.preparer();
+    let add = |grid: &mut Fusion, waiting: Option<(PreparedImage, PathBuf)>| {
+        let Some((image, of)) = waiting else { return Ok(()) };
+        task.add(1);
+        grid.add_prepared(&image).map_err(|e| unfit(&of, e))
+    };
+
+    // An image is prepared while the one before is added.
+    let mut waiting = None;
     let mut fits = true;
     images.each(ctx, |seen, of| {
-        let added = match seen {
-            Seen::Image(image) => grid.add(&image),
-            Seen::Rays(rays) => grid.add_rays(&rays.origins, &rays.points, &rays.colors, SensorNoise::LASER),
-        };
-        added.map_err(|e| Error::unfit(of, e.to_string()))?;
-        task.add(1);
-        fits = grid.bytes() <= most_bytes;
+        let last = waiting.take();
+        match seen {
+            Seen::Image(image) => {
+                let (added, next) = rayon::join(|| add(&mut grid, last), || preparer.prepare(*image));
+                added?;
+                waiting = Some((next, of.to_owned()));
+            }
+            Seen::Rays(Rays { origins, points, colors }) => {
+                add(&mut grid, last)?;
+                let added = grid.add_rays(&origins, &points, &colors, SensorNoise::LASER);
+                added.map_err(|e| unfit(of, e))?;
+                task.add(1);
+            }
+        }
+        fits = grid.fits(most_bytes);
         Ok(fits)
     })?;
+    if fits {
+        add(&mut grid, waiting)?;
+        fits = grid.fits(most_bytes);
+    }
     Ok(fits.then_some(grid))
 }

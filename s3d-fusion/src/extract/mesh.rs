@@ -35,54 +35,52 @@ impl FusedMesh {
     /// Makes a mesh of the pieces that have enough surface.
     pub(super) fn of_pieces(
         vertices: &[Vertex],
-        mut faces: Vec<[u32; 3]>,
+        faces: &[[u32; 3]],
         least_m2: f64,
     ) -> Result<Self, FusionError> {
         let mut pieces = DisjointSets::new(vertices.len());
-        for [a, b, c] in &faces {
+        for [a, b, c] in faces {
             pieces.unite(*a, *b);
             pieces.unite(*a, *c);
         }
         let root = pieces.roots();
+        let piece = |face: &[u32; 3]| root[face[0] as usize];
         let area = |face: &[u32; 3]| {
             let [a, b, c] = face.map(|v| vertices[v as usize].position.as_dvec3());
             0.5 * (b - a).cross(c - a).length()
         };
+        // Faces side by side are mostly of one piece.
+        let of_runs = |some: &[[u32; 3]]| -> Vec<(u32, f64)> {
+            let runs = some.chunk_by(|a, b| piece(a) == piece(b));
+            runs.map(|run| (piece(&run[0]), run.iter().map(area).sum())).collect()
+        };
         let mut area_m2 = vec![0.0; vertices.len()];
-        for some in faces.chunks(FACES) {
-            let areas: Vec<f64> = some.par_iter().map(area).collect();
-            for (face, area) in some.iter().zip(areas) {
-                area_m2[root[face[0] as usize] as usize] += area;
-            }
+        for (piece, area) in faces.par_chunks(FACES).flat_map_iter(of_runs).collect::<Vec<_>>() {
+            area_m2[piece as usize] += area;
         }
 
-        let count = faces.len();
-        faces.retain(|face| area_m2[root[face[0] as usize] as usize] >= least_m2);
-        if faces.is_empty() {
+        // Vertices keep their order. Each is one of a face.
+        let is_kept = |piece: u32| area_m2[piece as usize] >= least_m2;
+        let (mut new_of, mut count) = (Vec::with_capacity(vertices.len()), 0);
+        for piece in &root {
+            new_of.push(count);
+            count += u32::from(is_kept(*piece));
+        }
+        let kept = faces.par_iter().filter(|face| is_kept(piece(face)));
+        let kept: Vec<_> = kept.map(|face| face.map(|v| new_of[v as usize])).collect();
+        if kept.is_empty() {
             return Err(FusionError::NoSurface);
         }
 
-        // Vertices keep their order.
-        let mut new_of = vec![0; vertices.len()];
-        faces.iter().flatten().for_each(|v| new_of[*v as usize] = 1);
-        let mut kept = Vec::new();
-        for (vertex, new) in vertices.iter().zip(&mut new_of) {
-            let is_used = *new == 1;
-            *new = kept.len() as u32;
-            if is_used {
-                kept.push(*vertex);
-            }
+        let dropped_faces = faces.len() - kept.len();
+        let of_kept = vertices.par_iter().zip(&root).filter(|(_, piece)| is_kept(**piece));
+        let (positions, mut colors): (Vec<_>, Vec<_>) = of_kept.map(|(v, _)| (v.position, v.color)).unzip();
+        if colors.par_iter().all(|color| *color == [0; 3]) {
+            colors.clear();
         }
-        faces.iter_mut().flatten().for_each(|v| *v = new_of[*v as usize]);
-
-        let dropped_faces = count - faces.len();
-        let positions = kept.iter().map(|v| v.position).collect();
-        let known = |color: [u8; 3]| if color == [0; 3] { DEFAULT_COLOR } else { color };
-        let colors = if kept.iter().any(|v| v.color != [0; 3]) {
-            kept.iter().map(|v| known(v.color)).collect()
-        } else {
-            Vec::new()
-        };
+        let unknown = colors.par_iter_mut().filter(|color| **color == [0; 3]);
+        unknown.for_each(|color| *color = DEFAULT_COLOR);
+        let faces = kept;
         Ok(Self { positions, faces, colors, dropped_faces })
     }
 }

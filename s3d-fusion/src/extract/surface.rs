@@ -136,7 +136,7 @@ impl Surface {
     /// # Errors
     /// [`FusionError::NoSurface`] if nothing is left.
     pub fn into_mesh(self, least_piece_m2: f64) -> Result<FusedMesh, FusionError> {
-        let faces = self.faces.into_iter().map(|(_, face)| face).collect();
-        FusedMesh::of_pieces(&self.vertices, faces, least_piece_m2)
+        let faces: Vec<_> = self.faces.into_par_iter().map(|(_, face)| face).collect();
+        FusedMesh::of_pieces(&self.vertices, &faces, least_piece_m2)
     }
 }

@@ -39,20 +39,34 @@ enum Seen {
     Mixed,
 }
 
+/// What an image says, whatever other images say.
+#[derive(Debug)]
+pub(super) struct Prepared {
+    surfels: Vec<Surfel>,
+    touched: Touched,
+    pyramid: Pyramid,
+}
+
 impl Adding<'_> {
-    pub(super) fn add_to(&self, grid: &mut Grid) -> Result<(), FusionError> {
+    pub(super) fn prepare(&self) -> Prepared {
         let view = View::new(self.image);
         let surfels = self.image.surfels(self.scale.cell as f32);
+        let touched = self.touched(&view, &surfels);
+        let pyramid = Pyramid::new(&surfels, view.size);
+        Prepared { surfels, touched, pyramid }
+    }
+
+    pub(super) fn add_to(&self, grid: &mut Grid, prepared: &Prepared) -> Result<(), FusionError> {
+        let Prepared { surfels, touched: Touched { blocks: touched, low, high }, pyramid } = prepared;
+        let view = View::new(self.image);
         self.block(view.location)?;
-        let Touched { blocks: touched, low, high } = self.touched(&view, &surfels);
         if low == high {
             return Ok(());
         }
-        let bounds = self.bounds(&view, low, high)?;
-        grid.make_blocks(touched.into_iter().map(place_of));
+        let bounds = self.bounds(&view, *low, *high)?;
+        grid.make_blocks(touched.iter().copied().map(place_of));
 
         // Chunks between the sensor and what it saw.
-        let pyramid = Pyramid::new(&surfels, view.size);
         let [from, to] = bounds.map(chunk_of);
         let count = [0, 1, 2].map(|k| (to[k] - from[k] + 1) as usize);
         let effects: Vec<(Place, Effect)> = (0..count[0] * count[1] * count[2])
@@ -60,7 +74,7 @@ impl Adding<'_> {
             .filter_map(|i| {
                 let within = [i % count[0], i / count[0] % count[1], i / count[0] / count[1]];
                 let place = [0, 1, 2].map(|k| from[k] + within[k] as i32);
-                self.effect(&view, &pyramid, place).map(|effect| (place, effect))
+                self.effect(&view, pyramid, place).map(|effect| (place, effect))
             })
             .collect();
 
@@ -76,7 +90,7 @@ impl Adding<'_> {
             .zip(work.par_iter())
             .filter(|(_, has_work)| **has_work)
             .for_each(|((block, place), _)| {
-                dispatch!(level(), _simd => self.update(&view, &surfels, *place, block));
+                dispatch!(level(), _simd => self.update(&view, surfels, *place, block));
             });
         Ok(())
     }
@@ -159,21 +173,28 @@ impl Adding<'_> {
         let [right, up, out] =
             [view.turn.x_axis, view.turn.y_axis, view.turn.z_axis].map(|a| (a * cell).as_vec3());
 
-        for k in 0..SIDE * SIDE {
-            let start = first + up * (k % SIDE) as f32 + out * (k / SIDE) as f32;
-            let mut points = [[0.0; 8]; 3];
+        // Some rows of voxels at a time.
+        let side = SIDE as usize;
+        let mut steps = [[0.0; LANES]; 3];
+        for (axis, steps) in steps.iter_mut().enumerate() {
+            for (i, step) in steps.iter_mut().enumerate() {
+                *step = right[axis] * (i % side) as f32 + up[axis] * (i / side) as f32;
+            }
+        }
+        for k in (0..side * side).step_by(LANES / side) {
+            let start = first + up * (k % side) as f32 + out * (k / side) as f32;
+            let mut points = steps;
             for (axis, numbers) in points.iter_mut().enumerate() {
-                let numbers = numbers.iter_mut().enumerate();
-                numbers.for_each(|(i, k)| *k = start[axis] + right[axis] * i as f32);
+                numbers.iter_mut().for_each(|k| *k += start[axis]);
             }
             let (pixels, ranges) = view.pixels(&points);
-            if pixels != [u32::MAX; 8] {
-                self.update_row(block, k as usize * 8, surfels, &pixels, &ranges, &points);
+            if pixels != [u32::MAX; LANES] {
+                self.update_row(block, k * side, surfels, &pixels, &ranges, &points);
             }
         }
     }
 
-    /// Adds what pixels say of eight voxels from `first`. `points` are the voxels in the axes of the sensor.
+    /// Adds what pixels say of voxels from `first` on. `points` are the voxels in the axes of the sensor.
     #[inline(always)]
     fn update_row(
         &self,
@@ -185,13 +206,12 @@ impl Adding<'_> {
         points: &[Lanes; 3],
     ) {
         // What the pixels see, as columns.
-        let [mut x, mut y, mut z, mut offset] = [[0.0; LANES]; 4];
-        let [mut hit, mut trust, mut sigma, mut nearest] = [[0.0; LANES]; 4];
+        let mut columns = [[0.0; LANES]; 8];
         for lane in 0..LANES {
-            let s = surfels.get(pixels[lane] as usize).unwrap_or(&Surfel::NONE);
-            (x[lane], y[lane], z[lane], offset[lane]) = (s.normal.x, s.normal.y, s.normal.z, s.offset);
-            (hit[lane], trust[lane], sigma[lane], nearest[lane]) = (s.range, s.weight, s.sigma_m, s.nearest);
+            let s = surfels.get(pixels[lane] as usize).unwrap_or(&Surfel::NONE).numbers();
+            (0..8).for_each(|k| columns[k][lane] = s[k]);
         }
+        let [x, y, z, offset, hit, trust, sigma, nearest] = columns;
 
         let scale = &self.scale;
         let (front, cell) = (scale.front as f32, scale.cell as f32);
@@ -208,7 +228,7 @@ impl Adding<'_> {
 
             let counts = is_seen & (distance <= front) & (before <= scale.most_before());
             let weight = f32::from(counts) * scale.weight(distance, before, sigma[lane]) * trust[lane];
-            row.distance[lane] = distance / front;
+            row.distance[lane] = distance * front.recip();
             row.weight[lane] = weight;
             row.is_at[lane] = f32::from((weight > 0.0) & (distance < 0.5 * cell));
             is_touched[lane] = row.weight[lane] + row.is_far[lane] + row.is_through[lane] > 0.0;

@@ -13,7 +13,7 @@ mod walk;
 use crate::extract::{FusedMesh, Surface};
 use crate::grid::{FARTHEST, Grid, Place, SIDE};
 use crate::{FusionError, RangeImage, SensorNoise};
-use images::Adding;
+use images::{Adding, Prepared};
 use rays::AddingRays;
 use s3d_geom::glam::{DVec3, Vec3};
 
@@ -52,7 +52,7 @@ impl Tile {
 }
 
 /// Lengths of a grid, metres.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 struct Scale {
     cell: f64,
     /// The truncation before surfaces.
@@ -118,10 +118,36 @@ impl Scale {
         let cell = self.cell as f32;
         let behind = self.behind(sigma_m);
         let counts = f32::from((distance > -behind) & (before >= -3.0 * behind));
-        let near = before / (1.5 * cell);
+        let near = before * (1.5 * cell).recip();
         let side = (distance + behind) / (behind - 0.5 * cell - sigma_m).max(0.5 * cell);
         let side = side.min(1.0);
         counts * (side * side / (1.0 + near * near))
+    }
+}
+
+/// Does the half of the work on an image that does not depend on other images.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Preparer {
+    scale: Scale,
+    tile: Option<Tile>,
+}
+
+/// An image that is ready to be added to a grid.
+#[derive(Debug)]
+pub struct PreparedImage {
+    image: RangeImage,
+    prepared: Prepared,
+    by: Preparer,
+}
+
+impl Preparer {
+    /// Fits a plane to each pixel, and finds the blocks near them.
+    pub fn prepare(&self, image: RangeImage) -> PreparedImage {
+        PreparedImage { prepared: self.adding(&image, 0).prepare(), image, by: *self }
+    }
+
+    fn adding<'a>(&self, image: &'a RangeImage, number: u32) -> Adding<'a> {
+        Adding { image, scale: self.scale, tile: self.tile, number }
     }
 }
 
@@ -175,9 +201,27 @@ impl Fusion {
     /// # Errors
     /// [`FusionError::TooFar`].
     pub fn add(&mut self, image: &RangeImage) -> Result<(), FusionError> {
-        let adding = Adding { image, scale: self.scale, tile: self.tile, number: self.added };
+        let adding = self.preparer().adding(image, self.added);
         self.added += 1;
-        adding.add_to(&mut self.grid)
+        adding.add_to(&mut self.grid, &adding.prepare())
+    }
+
+    /// Returns what prepares images for this grid, while others are added to it.
+    pub fn preparer(&self) -> Preparer {
+        Preparer { scale: self.scale, tile: self.tile }
+    }
+
+    /// Adds an image that [`Fusion::preparer`] prepared: the grid is the same as after [`Fusion::add`].
+    ///
+    /// # Errors
+    /// [`FusionError::TooFar`].
+    pub fn add_prepared(&mut self, image: &PreparedImage) -> Result<(), FusionError> {
+        if image.by != self.preparer() {
+            return self.add(&image.image);
+        }
+        let adding = self.preparer().adding(&image.image, self.added);
+        self.added += 1;
+        adding.add_to(&mut self.grid, &image.prepared)
     }
 
     /// Adds rays with an origin each, as mobile scanners measure them, in world metres. `colors` is empty or
@@ -207,6 +251,11 @@ impl Fusion {
     /// Returns the number of bytes that blocks and their directory take.
     pub fn bytes(&self) -> u64 {
         self.grid.bytes()
+    }
+
+    /// Whether the grid takes no more bytes than these.
+    pub fn fits(&self, bytes: u64) -> bool {
+        self.grid.most_bytes() <= bytes || self.grid.bytes() <= bytes
     }
 
     /// Returns the number of blocks.

@@ -4,10 +4,12 @@ use super::view::Extent;
 use crate::range_image::Surfel;
 
 /// Levels of squares of 4, 8, 16 … pixels.
+#[derive(Debug)]
 pub(crate) struct Pyramid {
     levels: Vec<Level>,
 }
 
+#[derive(Debug)]
 struct Level {
     width: usize,
     height: usize,

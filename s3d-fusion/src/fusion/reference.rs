@@ -85,3 +85,20 @@ fn the_sparse_grid_is_the_dense_one() {
     }
     assert!(crossings > 20_000, "{crossings}");
 }
+
+#[test]
+fn images_that_are_prepared_ahead_make_the_same_grid() {
+    let images = images(3);
+    let options = FusionOptions { cell_m: 0.03, ..FusionOptions::default() };
+    let mut plain = Fusion::new(options.clone()).unwrap();
+    images.iter().for_each(|image| plain.add(image).unwrap());
+
+    let mut ahead = Fusion::new(options.clone()).unwrap();
+    let other = Fusion::new(FusionOptions { cell_m: 0.05, ..options }).unwrap();
+    let preparers = [ahead.preparer(), ahead.preparer(), other.preparer()];
+    let prepared: Vec<_> = images.into_iter().zip(preparers).map(|(i, by)| by.prepare(i)).collect();
+    prepared.iter().for_each(|image| ahead.add_prepared(image).unwrap());
+
+    assert_eq!(plain.surface(), ahead.surface());
+    assert!(plain.fits(plain.bytes()) && !plain.fits(plain.bytes() - 1));
+}

@@ -2,8 +2,8 @@
 
 use super::images::Adding;
 use super::view::View;
-use super::walk::{self, Ways, blocks_along};
-use crate::grid::{FARTHEST, key};
+use super::walk::{self, Ways, blocks_along, cubes_of};
+use crate::grid::{FARTHEST, Place, key};
 use crate::lanes::{LANES, Lanes};
 use crate::range_image::{Rays, Surfel};
 use rayon::prelude::*;
@@ -11,6 +11,7 @@ use s3d_geom::glam::{DVec3, Mat3, Vec3};
 use s3d_simd::{dispatch, level};
 
 /// The blocks near hits.
+#[derive(Debug)]
 pub(super) struct Touched {
     /// The keys of the blocks, in order.
     pub(super) blocks: Vec<u64>,
@@ -20,9 +21,9 @@ pub(super) struct Touched {
 }
 
 /// Rows of an image that are worked on at a time.
-const ROWS: usize = 8;
-/// The number of ways that are remembered.
-const RECENT: usize = 256;
+const ROWS: usize = 32;
+/// The numbers of ways and of blocks that are remembered.
+const RECENT: usize = 1024;
 
 impl Adding<'_> {
     pub(super) fn touched(&self, view: &View<'_>, surfels: &[Surfel]) -> Touched {
@@ -76,7 +77,7 @@ impl<'a> Near<'a> {
     fn band(&self, rays: &Rays<'_>, first: usize, surfels: &[Surfel]) -> Touched {
         let mut blocks = Vec::new();
         let (mut low, mut high) = ([[0.0_f32; LANES]; 3], [[0.0_f32; LANES]; 3]);
-        let mut recent = [[i32::MIN; 4]; RECENT];
+        let mut recent = Recent::default();
         let mut row_rays = [const { Vec::new() }; 3];
         for (row, surfels) in surfels.chunks(self.width).enumerate() {
             rays.row(first + row, &mut row_rays);
@@ -133,35 +134,74 @@ impl<'a> Near<'a> {
 
     /// Adds the blocks of rays, but not of rays that go a way of late.
     #[inline(always)]
-    fn walk(&self, hits: &Hits, recent: &mut [[i32; 4]; RECENT], blocks: &mut Vec<u64>) {
+    fn walk(&self, hits: &Hits, recent: &mut Recent, blocks: &mut Vec<u64>) {
         let ways = Ways::of(&hits.ends);
-        for lane in (0..LANES).filter(|lane| hits.is_seen[*lane]) {
+        // The first pixel of a run of equal ways that is seen.
+        let changes = ways.changes();
+        let mut is_done = false;
+        for lane in 0..LANES {
+            is_done &= changes >> lane & 1 == 0;
+            if is_done | !hits.is_seen[lane] {
+                continue;
+            }
+            is_done = true;
             let way = ways.lane(lane);
-            let mixed = way
-                .iter()
-                .fold(0, |mixed, k| (mixed ^ *k as u32).wrapping_mul(0x9e37_79b9));
-            let known = &mut recent[(mixed >> 24) as usize];
+            let known = recent.way(way);
             if *known == way {
                 continue;
             }
             let ends = [0, 1].map(|end: usize| {
                 let [x, y, z] = &hits.ends[end];
-                Vec3::new(x[lane], y[lane], z[lane]).as_dvec3()
+                Vec3::new(x[lane], y[lane], z[lane])
             });
-            let is_near = |end: &DVec3| end.abs().max_element() < f64::from(FARTHEST - 8);
+            let is_near = |end: &Vec3| end.abs().max_element() < (FARTHEST - 8) as f32;
             if !ends.iter().all(is_near) {
                 continue;
             }
-            if Ways::is_short(way) {
+            let is_short = Ways::is_short(way);
+            if is_short {
                 *known = way;
             }
-            blocks_along(ends, |from_sensor| {
+            let visit = |from_sensor: Place| {
                 let block = [0, 1, 2].map(|k| self.sensor[k] + from_sensor[k]);
-                if self.adding.tile.is_none_or(|tile| tile.holds(block)) {
+                if self.adding.tile.is_none_or(|tile| tile.holds(block)) && recent.is_new(key(block)) {
                     blocks.push(key(block));
                 }
-            });
+            };
+            if is_short {
+                cubes_of(way, visit);
+            } else {
+                blocks_along(ends.map(|end| end.as_dvec3()), visit);
+            }
         }
+    }
+}
+
+/// The ways and the blocks of late.
+struct Recent {
+    ways: [[i32; 4]; RECENT],
+    blocks: [u64; RECENT],
+}
+
+impl Default for Recent {
+    fn default() -> Self {
+        Self { ways: [[i32::MIN; 4]; RECENT], blocks: [u64::MAX; RECENT] }
+    }
+}
+
+impl Recent {
+    /// Where a way is kept, or another one that came there.
+    #[inline(always)]
+    fn way(&mut self, way: [i32; 4]) -> &mut [i32; 4] {
+        let mix = |mixed: u32, k: &i32| (mixed ^ *k as u32).wrapping_mul(0x9e37_79b9);
+        &mut self.ways[way.iter().fold(0, mix) as usize >> (u32::BITS - RECENT.ilog2())]
+    }
+
+    /// Keeps the key of a block, and returns false if it is there.
+    #[inline(always)]
+    fn is_new(&mut self, block: u64) -> bool {
+        let place = block.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> (u64::BITS - RECENT.ilog2());
+        std::mem::replace(&mut self.blocks[place as usize], block) != block
     }
 }
 

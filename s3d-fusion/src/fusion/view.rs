@@ -1,6 +1,6 @@
 //! Which pixels of an image see a voxel, or a box of voxels.
 
-use crate::lanes::{atan2, floor};
+use crate::lanes::{LANES, Lanes, atan2, floor};
 use crate::range_image::{AngleGrid, Directions, RangeImage, angles_of};
 use s3d_geom::PhotoLens;
 use s3d_geom::glam::{DMat3, DVec3};
@@ -58,13 +58,13 @@ impl<'a> View<'a> {
     /// Returns the pixels and the ranges of points in the axes of the sensor; `u32::MAX` for points outside
     /// of the image.
     #[inline(always)]
-    pub(crate) fn pixels(&self, points: &[[f32; 8]; 3]) -> ([u32; 8], [f32; 8]) {
+    pub(crate) fn pixels(&self, points: &[Lanes; 3]) -> ([u32; LANES], Lanes) {
         let [x, y, z] = points;
-        let mut pixels = [u32::MAX; 8];
+        let mut pixels = [u32::MAX; LANES];
         match &self.projection {
             Projection::Pinhole { focal, center } => {
                 let [width, height] = self.size.map(|s| s as f32);
-                for k in 0..8 {
+                for k in 0..LANES {
                     let inverse = z[k].recip();
                     let u = focal[0] * x[k] * inverse + center[0];
                     let v = focal[1] * y[k] * inverse + center[1];
@@ -77,7 +77,7 @@ impl<'a> View<'a> {
             }
             Projection::Lens(lens) => {
                 let size = self.size.map(f64::from);
-                for k in 0..8 {
+                for k in 0..LANES {
                     let point = DVec3::new(x[k].into(), y[k].into(), z[k].into());
                     let Some(at) = lens.project(point) else { continue };
                     if at.x >= 0.0 && at.y >= 0.0 && at.x < size[0] && at.y < size[1] {
@@ -87,13 +87,13 @@ impl<'a> View<'a> {
                 (pixels, *z)
             }
             Projection::Angles(grid) => {
-                let (mut flat, mut ranges) = ([0.0; 8], [0.0; 8]);
-                for k in 0..8 {
+                let (mut flat, mut ranges) = ([0.0; LANES], [0.0; LANES]);
+                for k in 0..LANES {
                     let square = x[k] * x[k] + z[k] * z[k];
                     (flat[k], ranges[k]) = (square.sqrt(), (square + y[k] * y[k]).sqrt());
                 }
                 let (azimuths, elevations) = (atan2(x, z), atan2(y, &flat));
-                for k in 0..8 {
+                for k in 0..LANES {
                     if let Some([column, row]) = grid.pixel(azimuths[k].into(), elevations[k].into()) {
                         pixels[k] = row * self.size[0] + column;
                     }

@@ -61,14 +61,54 @@ impl Ways {
     /// Returns the way of a segment as numbers. If it is short, segments of equal ways cross the same cubes.
     #[inline(always)]
     pub(super) fn lane(&self, lane: usize) -> [i32; 4] {
-        let [x, y, z] = self.first;
+        let [x, y, z] = &self.first;
         [x[lane], y[lane], z[lane], self.steps[lane]]
+    }
+
+    /// Returns the segments whose way is not that of the one before, or is long, as bits.
+    #[inline(always)]
+    pub(super) fn changes(&self) -> u32 {
+        let [x, y, z] = &self.first;
+        let mut changes = 1;
+        for lane in 1..LANES {
+            let off = |column: &[i32; LANES]| column[lane] ^ column[lane - 1];
+            let is_other = off(x) | off(y) | off(z) | off(&self.steps) != 0;
+            changes |= u32::from(is_other | (self.steps[lane] == LONG)) << lane;
+        }
+        changes
     }
 
     /// Whether a segment crosses at most one border on each axis.
     #[inline(always)]
     pub(super) fn is_short(way: [i32; 4]) -> bool {
         way[3] != LONG
+    }
+}
+
+/// Calls `visit` with each unit cube that the segments of a short way cross, like [`blocks_along`].
+#[inline(always)]
+pub(super) fn cubes_of(way: [i32; 4], mut visit: impl FnMut(Place)) {
+    let [x, y, z, steps] = way;
+    let step = [0, 2, 4].map(|shift| (steps >> shift & 3) - 1);
+    let crosses = step.map(|step| step != 0);
+    let [xy, yz, xz] = [6, 7, 8].map(|bit| steps >> bit & 1 == 1);
+    // Whether an axis comes after the other two.
+    let after = [[!xy, !xz], [xy, !yz], [yz, xz]];
+    let others = [[1, 2], [0, 2], [1, 0]];
+    let mut axes = [0; 3];
+    for axis in (0..3).filter(|axis| crosses[*axis]) {
+        let rank = |k: usize| usize::from(after[axis][k] & crosses[others[axis][k]]);
+        axes[rank(0) + rank(1)] = axis;
+    }
+
+    let mut at = [x, y, z];
+    visit(at);
+    for axis in axes
+        .into_iter()
+        .take(crosses.into_iter().filter(|crosses| *crosses).count())
+    {
+        at[axis] += step[axis];
+        visit(at);
     }
 }
 
@@ -159,7 +199,7 @@ mod tests {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
             ((state >> 40) as f32 / (1 << 24) as f32 - 0.5) * 2.0 * most
         };
-        let mut cubes_of = std::collections::BTreeMap::new();
+        let mut cubes_by_way = std::collections::BTreeMap::new();
         let (mut short, mut again) = (0, 0);
         for _ in 0..20_000 {
             let start = [0; 3].map(|_: i32| [0; LANES].map(|_: i32| number(1.5)));
@@ -170,8 +210,11 @@ mod tests {
                     |ends: &[Lanes; 3]| DVec3::from_array([0, 1, 2].map(|k: usize| ends[k][lane].into()));
                 let mut cubes = Vec::new();
                 blocks_along([at(&start), at(&end)], |cube| cubes.push(cube));
+                let mut of_way = Vec::new();
+                cubes_of(ways.lane(lane), |cube| of_way.push(cube));
+                assert_eq!(of_way, cubes, "{:?}", ways.lane(lane));
                 short += 1;
-                if let Some(known) = cubes_of.insert(ways.lane(lane), cubes.clone()) {
+                if let Some(known) = cubes_by_way.insert(ways.lane(lane), cubes.clone()) {
                     again += 1;
                     assert_eq!(known, cubes, "{:?}", ways.lane(lane));
                 }

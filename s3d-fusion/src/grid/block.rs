@@ -1,7 +1,7 @@
 //! A block of voxels: 6 bytes each, and 3 more with colours.
 
-use super::VOXELS;
-use crate::lanes::{LANES, Lanes, floor};
+use super::{SIDE, VOXELS};
+use crate::lanes::{LANES, Lanes, floor, pick};
 
 /// The voxels of a block as columns. Voxel (i, j, k) is at (k·8 + j)·8 + i.
 #[derive(Clone, Debug)]
@@ -23,7 +23,7 @@ const PASSED: i16 = i16::MAX;
 /// The colour of voxels without one.
 pub(crate) const NO_COLOR: [u8; 3] = [0; 3];
 
-/// What an image says of eight voxels side by side. Answers are 1 or 0.
+/// What an image says of voxels side by side. Answers are 1 or 0.
 #[derive(Default)]
 pub(crate) struct Row {
     /// The signed distance as a share of the truncation.
@@ -93,6 +93,9 @@ impl RowStates {
 }
 
 impl Block {
+    /// The bytes of a block with colours.
+    pub(crate) const MOST_BYTES: usize = size_of::<Self>() + size_of::<[[u8; 3]; VOXELS]>();
+
     /// Returns what is known of a voxel. `free` is how many images saw through the whole block.
     pub(crate) fn voxel(&self, i: usize, free: u16) -> Voxel {
         if self.weight[i] == 0 {
@@ -111,12 +114,12 @@ impl Block {
         }
     }
 
-    /// Does for eight voxels from `first` on what [`Block::voxel`] does for one, and writes their distances.
+    /// Does for the eight voxels of a row what [`Block::voxel`] does for one, and writes their distances.
     /// That of voxels that rays passed alone is `passed`; it is any number where nothing is known.
     #[inline]
     pub(crate) fn row(&self, first: usize, free: u16, passed: f32, values: &mut [f32]) -> RowStates {
         let mut states = RowStates::default();
-        for (lane, value) in values[..LANES].iter_mut().enumerate() {
+        for (lane, value) in values[..SIDE as usize].iter_mut().enumerate() {
             let i = first + lane;
             let (distance, has_distance) = (self.distance[i], self.weight[i] != 0);
             let is_passed = !has_distance & ((free > 0) | (distance == PASSED));
@@ -163,35 +166,38 @@ impl Block {
         share
     }
 
-    /// Does for eight voxels from `first` on what [`Block::pass`] and then [`Block::observe`] do for one.
+    /// Does for voxels from `first` on what [`Block::pass`] and then [`Block::observe`] do for one.
     /// Returns the shares that the distances have in the means.
     #[inline(always)]
     pub(crate) fn observe_row(&mut self, first: usize, row: &Row) -> Lanes {
-        let (mut shares, mut distances, mut weights) = ([0.0; LANES], [0; LANES], [0; LANES]);
+        let place = first..first + LANES;
+        let [distances, votes] = [&mut self.distance, &mut self.votes].map(|c| &mut c[place.clone()]);
+        let weights = &mut self.weight[place];
+        let (mut old, mut distance, mut vote) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
         for lane in 0..LANES {
-            let old = f32::from_bits(u32::from(self.weight[first + lane]) << 16);
-            let distance = f32::from(self.distance[first + lane]);
-            let (weight, is_new) = (row.weight[lane], old == 0.0);
-            let sum = old + weight;
-            let share = weight / if is_new & (weight == 0.0) { 1.0 } else { sum };
-            let mean = if is_new { 0.0 } else { distance };
-            let mean = mean + (row.distance[lane] * 32767.0 - mean) * share;
-            let mean = mean.clamp(-32766.0, 32766.0);
-            let unseen = if is_new & (row.is_far[lane] > 0.0) {
-                f32::from(PASSED)
-            } else {
-                distance
-            };
-            let distance = if weight > 0.0 { mean } else { unseen };
-            shares[lane] = share;
-            distances[lane] = floor(distance + 0.5);
-            weights[lane] = ((sum.to_bits() + 0x8000) >> 16) as i32;
+            old[lane] = f32::from_bits(u32::from(weights[lane]) << 16);
+            distance[lane] = f32::from(distances[lane]);
+            vote[lane] = f32::from(votes[lane]);
         }
-        for (lane, (distance, weight)) in distances.into_iter().zip(weights).enumerate() {
-            let votes = (f32::from(self.votes[first + lane]) - row.is_through[lane]).max(i16::MIN.into());
-            self.votes[first + lane] = (votes + row.is_at[lane]).min(i16::MAX.into()) as i16;
-            self.distance[first + lane] = distance as i16;
-            self.weight[first + lane] = weight as u16;
+
+        let (mut shares, mut sums) = ([0.0; LANES], [0.0; LANES]);
+        for lane in 0..LANES {
+            let weight = row.weight[lane];
+            let is_new = f32::from(old[lane] == 0.0);
+            let sum = old[lane] + weight;
+            let share = weight / (sum + f32::from(sum == 0.0));
+            let mean = distance[lane] - is_new * distance[lane];
+            let mean = mean + (row.distance[lane] * 32767.0 - mean) * share;
+            let unseen = is_new * row.is_far[lane] * (f32::from(PASSED) - distance[lane]);
+            let mean = mean.clamp(-32766.0, 32766.0);
+            distance[lane] = pick(weight > 0.0, mean, distance[lane] + unseen);
+            (shares[lane], sums[lane]) = (share, sum);
+        }
+        for lane in 0..LANES {
+            distances[lane] = floor(distance[lane] + 0.5) as i16;
+            weights[lane] = ((sums[lane].to_bits() + 0x8000) >> 16) as u16;
+            let vote = (vote[lane] - row.is_through[lane]).max(i16::MIN.into());
+            votes[lane] = floor((vote + row.is_at[lane]).min(i16::MAX.into())) as i16;
         }
         shares
     }
@@ -224,7 +230,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_row_is_eight_voxels() {
+    fn voxels_side_by_side_are_single_voxels() {
         let mut state = 7_u32;
         let mut below = |most: u32| {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -259,7 +265,7 @@ mod tests {
             .into_iter()
             .flat_map(|first| [0, 1, 5].map(|free| (first, free)))
         {
-            let mut values = [0.0; LANES];
+            let mut values = [0.0; SIDE as usize];
             let states = rows.row(first, free, 0.25, &mut values);
             let mut expected = RowStates::default();
             for (lane, value) in values.into_iter().enumerate() {

@@ -95,11 +95,17 @@ impl Grid {
 
     /// Returns the number of bytes of blocks and their directory.
     pub(crate) fn bytes(&self) -> u64 {
-        let blocks: usize = self
-            .blocks
-            .par_iter()
-            .map(|b| b.bytes() + size_of::<(Box<Block>, Place)>())
-            .sum();
+        let blocks: usize = self.blocks.par_iter().map(|block| block.bytes()).sum();
+        blocks as u64 + self.directory_bytes()
+    }
+
+    /// Returns the number of bytes if all blocks had colours. The blocks are not looked at.
+    pub(crate) fn most_bytes(&self) -> u64 {
+        (self.blocks.len() * Block::MOST_BYTES) as u64 + self.directory_bytes()
+    }
+
+    fn directory_bytes(&self) -> u64 {
+        let blocks = self.blocks.len() * size_of::<(Box<Block>, Place)>();
         let chunks = self.chunks.len() * (size_of::<Chunk>() + size_of::<(u64, u32)>());
         (blocks + chunks) as u64
     }

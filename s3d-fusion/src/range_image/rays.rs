@@ -43,7 +43,13 @@ impl Rays<'_> {
             fill(rays, directions.map(|d| d.map_or(DVec3::NAN, |d| d / d.z)));
         } else {
             let y = (y - lens.center_px().y) / lens.focal_px().y;
-            fill(rays, self.columns.iter().map(|[x, _]| DVec3::new(*x, y, 1.0)));
+            let [across, down, ahead] = rays;
+            across.clear();
+            across.extend(self.columns.iter().map(|[x, _]| *x as f32));
+            for (axis, number) in [(down, y as f32), (ahead, 1.0)] {
+                axis.clear();
+                axis.resize(self.columns.len(), number);
+            }
         }
     }
 }

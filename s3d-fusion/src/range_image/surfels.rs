@@ -32,6 +32,13 @@ pub(crate) struct Surfel {
 impl Surfel {
     pub(crate) const NONE: Self =
         Self { normal: Vec3::ZERO, offset: 0.0, range: 0.0, weight: 0.0, sigma_m: 0.0, nearest: 0.0 };
+
+    /// Its numbers, in the order of the fields.
+    #[inline(always)]
+    pub(crate) fn numbers(&self) -> [f32; 8] {
+        let [x, y, z] = self.normal.to_array();
+        [x, y, z, self.offset, self.range, self.weight, self.sigma_m, self.nearest]
+    }
 }
 
 /// Rows that a task works on.
@@ -450,11 +457,7 @@ mod tests {
         let image = image(|x, y| (x * y) % 11 == 3);
         let bits = |level| -> Vec<[u32; 8]> {
             let surfels = image.surfels_at(0.02, level);
-            let numbers = |s: &Surfel| {
-                let [x, y, z] = s.normal.to_array();
-                [x, y, z, s.offset, s.range, s.weight, s.sigma_m, s.nearest].map(f32::to_bits)
-            };
-            surfels.iter().map(numbers).collect()
+            surfels.iter().map(|s| s.numbers().map(f32::to_bits)).collect()
         };
         let mut levels = ProvenLevel::all().into_iter().map(bits);
         let plain = levels.next().unwrap();

@@ -88,20 +88,24 @@ impl<'a> Grid<'a> {
     /// exceed the edge of the cubes.
     pub(crate) fn nearest(&self, p: DVec3, normal: DVec3, reach: &Reach) -> Option<u32> {
         let [x, y, z] = cell(p.as_vec3(), self.cell_m);
-        let mut best = (f64::INFINITY, None);
+        // No point beyond both reaches fits.
+        let most = reach.along_m * reach.along_m + reach.across_m * reach.across_m;
+        let mut best = (1.001 * most, None);
         for x in x.saturating_sub(1)..=x.saturating_add(1) {
             for y in y.saturating_sub(1)..=y.saturating_add(1) {
                 let begin = self.cells.partition_point(|c| c.0 < [x, y, z.saturating_sub(1)]);
                 let last = [x, y, z.saturating_add(1)];
                 for &(_, i) in self.cells[begin..].iter().take_while(|c| c.0 <= last) {
                     let q = self.points.positions[i as usize].as_dvec3();
-                    let n = self.points.normals[i as usize].as_dvec3();
                     let (between, squared) = (p - q, p.distance_squared(q));
+                    if squared >= best.0 {
+                        continue;
+                    }
+                    let n = self.points.normals[i as usize].as_dvec3();
                     let along = n.dot(between);
                     let cosine = n.dot(normal);
                     let cosine = if reach.is_two_sided { cosine.abs() } else { cosine };
-                    let fits = squared < best.0
-                        && along.abs() <= reach.along_m
+                    let fits = along.abs() <= reach.along_m
                         && squared - along * along <= reach.across_m * reach.across_m
                         && cosine >= reach.cosine;
                     if fits {
