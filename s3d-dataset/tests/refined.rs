@@ -28,10 +28,11 @@ fn scores(shots: &[Shot], world: &World<'_>, labels_of: impl Fn(&Shot) -> Vec<u3
 fn refined_labels_are_nearer_to_the_truth() {
     let mut scene = Building { texture_scale: 0.3, ..Building::demo() }.build().unwrap();
     scene.locations.truncate(1);
-    let plan = ScanPlan { cell_m: 0.04, max_error_m: 0.015, pixels: 0.12, points_per_m2: 500.0 };
+    let plan = ScanPlan { cell_m: 0.02, max_error_m: 0.008, pixels: 0.08, points_per_m2: 500.0 };
     let scan = scanned(&scene, &plan).unwrap();
     let world = World::new(&scene, &scan);
-    let poses = [0.6, 3.1].map(|yaw| Pose::level(scene.locations[0].position, yaw).turned(0.0, -0.2));
+    let poses = [0.6, 1.6, 2.6, 3.6, 4.6, 5.6]
+        .map(|yaw| Pose::level(scene.locations[0].position, yaw).turned(0.0, -0.2));
 
     let photographs: Vec<Shot> = poses.map(|pose| world.photograph(pose, 1.1, 240, 0.001)).into();
     let views: Vec<Shot> = poses
@@ -43,7 +44,7 @@ fn refined_labels_are_nearer_to_the_truth() {
         let told = format!("{kind}: {before:?} → {after:?}");
         assert!(before.near.wrong > 1000, "{told}");
         // The scan is coarse, so that the test is fast: most wrong pixels are not at an edge of the picture.
-        assert!(after.near.wrong * 20 < before.near.wrong * 19, "{told}");
+        assert!(after.near.wrong * 12 < before.near.wrong * 11, "{told}");
         assert!(after.thin.percent() <= before.thin.percent() + 0.5, "{told}");
         assert!(mean_iou(&after.trimap) > mean_iou(&before.trimap), "{told}");
         assert!(after.f_scores()[0] > before.f_scores()[0] + 0.02, "{told}");
