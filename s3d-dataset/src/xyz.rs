@@ -182,12 +182,12 @@ fn make_one(
     let depth = decode_gray16(&files.read_bytes(&image.depth)?, &image.depth)?;
 
     let camera = if image.frame == Frame::Panorama {
-        if depth.width() != 2 * depth.height() {
-            let size =
-                format!("{} × {} pixels: a panorama is twice as wide as high", depth.width(), depth.height());
+        let (width, height) = (depth.width(), depth.height());
+        if width != 2 * height {
+            let size = format!("{width} × {height} pixels: a panorama is twice as wide as high");
             return Err(FileError::format(&image.depth, size).into());
         }
-        Camera::equirectangular(pose.pose(), depth.width())
+        Camera::equirectangular(pose.pose(), width)
     } else {
         let fov = pose.field_of_view_rads;
         if !(fov > 0.0 && fov < std::f64::consts::PI) {

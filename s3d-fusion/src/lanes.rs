@@ -1,12 +1,13 @@
 //! Numbers of pixels or voxels side by side, as the compiler makes vectors of them.
 //!
-//! Choices are made between numbers that are there anyway, or by a factor of 1 or 0. Of a choice between
-//! computed numbers the compiler makes a branch for each lane.
+//! Choices are made between numbers that are there anyway, by a factor of 1 or 0, or by [`pick`]. Of another
+//! choice between computed numbers the compiler makes a branch for each lane.
 
 use s3d_geom::ARCTANGENT;
 use std::f32::consts::{FRAC_PI_2, PI};
 
-/// As many as a vector register of AVX-512 holds. With AVX2 they are faster than half as many, too.
+/// As many as a vector register of AVX-512 holds: two rows of a block. With AVX2 they are faster than half as
+/// many, too.
 pub(crate) const LANES: usize = 16;
 
 /// Numbers side by side.

@@ -11,7 +11,7 @@
 //! | – | – | – | nothing |
 //! | any | complete | any | a complete data set; the other files are removed |
 //! | there | – or running | any | an unfinished export, to continue |
-//! | – | – or running | there | the new one had not begun, or failed for good: the earlier one comes back |
+//! | – | – or running | there | the new one had not begun, or failed for good: the earlier comes back |
 //! | – | running | – | the rest of an export by a version without a journal, which nobody continues |
 
 use crate::account::Account;

@@ -253,7 +253,7 @@ mod tests {
             for (guess, real) in
                 [(estimate.files, files), (estimate.bytes, bytes), (estimate.core_seconds, seconds)]
             {
-                assert!((0.6..1.8).contains(&(guess / real)), "{area_m2} m²: {guess} for {real}: {estimate}");
+                assert!((0.6..1.8).contains(&(guess / real)), "{area_m2} m²: {guess}, {real}: {estimate}");
             }
         }
     }

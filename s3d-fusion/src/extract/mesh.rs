@@ -80,7 +80,6 @@ impl FusedMesh {
         }
         let unknown = colors.par_iter_mut().filter(|color| **color == [0; 3]);
         unknown.for_each(|color| *color = DEFAULT_COLOR);
-        let faces = kept;
-        Ok(Self { positions, faces, colors, dropped_faces })
+        Ok(Self { positions, faces: kept, colors, dropped_faces })
     }
 }

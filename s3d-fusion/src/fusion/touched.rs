@@ -145,11 +145,13 @@ impl<'a> Near<'a> {
                 continue;
             }
             is_done = true;
+
             let way = ways.lane(lane);
             let known = recent.way(way);
             if *known == way {
                 continue;
             }
+
             let ends = [0, 1].map(|end: usize| {
                 let [x, y, z] = &hits.ends[end];
                 Vec3::new(x[lane], y[lane], z[lane])
@@ -162,6 +164,7 @@ impl<'a> Near<'a> {
             if is_short {
                 *known = way;
             }
+
             let visit = |from_sensor: Place| {
                 let block = [0, 1, 2].map(|k| self.sensor[k] + from_sensor[k]);
                 if self.adding.tile.is_none_or(|tile| tile.holds(block)) && recent.is_new(key(block)) {
