@@ -39,6 +39,20 @@ fn both_sides_of_a_door_and_the_legs_of_a_table_are_kept() {
 }
 
 #[test]
+fn a_sheet_of_no_thickness_has_both_sides_within_a_cell() {
+    let sheet = Shape::cuboid(dvec3(-0.3, -0.0005, -0.4), dvec3(0.3, 0.0005, 0.4));
+    // Three images see its front, and one sees its back.
+    let eyes = [dvec3(-0.4, -1.2, 0.0), dvec3(0.0, -1.2, 0.3), dvec3(0.4, -1.2, 0.0), dvec3(0.2, 1.2, 0.0)];
+    let mesh = fused(&[sheet], &eyes.map(|eye| look(eye, DVec3::ZERO)), lens(240, 240, 260.0), 0.01);
+
+    let is_within = |p: &&Vec3| p.x.abs() < 0.25 && p.z.abs() < 0.35;
+    let offs: Vec<f32> = mesh.positions.iter().filter(is_within).map(|p| p.y).collect();
+    let most = offs.iter().fold(0.0_f32, |most, y| most.max(y.abs()));
+    // A side of 50 × 70 cm has some 3,500 crossings.
+    assert!(offs.len() > 6500 && most < 0.01, "{} {most}", offs.len());
+}
+
+#[test]
 fn a_step_in_depth_is_not_bridged() {
     let near = Shape::cuboid(dvec3(-1.0, 1.0, -1.0), dvec3(0.0, 1.1, 1.0));
     let wall = Shape::Plane(dvec3(0.0, 1.6, 0.0), -DVec3::Y);

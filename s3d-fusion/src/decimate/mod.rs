@@ -96,8 +96,9 @@ pub enum DecimateError {
     Stopped,
 }
 
-/// Pieces of about this many old faces are decimated on their own, then what lies between them.
-const FACES_A_PIECE: f64 = 40_000.0;
+/// Pieces of about this many old faces are decimated on their own, then what lies between them. Those of the
+/// first round fit into the second-level cache.
+const FACES_A_PIECE: [f64; 3] = [10_000.0, 40_000.0, 40_000.0];
 
 /// Where the pieces of each round begin, in pieces.
 const SHIFTS: [f64; 3] = [0.0, 1.0 / 3.0, 2.0 / 3.0];
@@ -160,12 +161,12 @@ pub fn decimate_while(
     Ok(compact(&whole, !mesh.colors.is_empty()))
 }
 
-/// Decimates pieces of about so many faces, in rounds. With a target, then the whole. `None` if `go_on` says
-/// no.
+/// Decimates pieces of about so many faces, in rounds. With a target it is the last of them, and then the
+/// whole. `None` if `go_on` says no.
 fn decimate_in_pieces(
     mesh: &MeshColumns<'_>,
     options: &DecimateOptions,
-    faces_a_piece: f64,
+    faces_a_piece: [f64; 3],
     go_on: &mut dyn FnMut(f64) -> bool,
 ) -> Option<Whole> {
     let mut whole = Whole::new(mesh, options.max_error_m, options.color_weight_m / 255.0);
@@ -174,17 +175,23 @@ fn decimate_in_pieces(
     let limits =
         |faces| Limits { distance_m: SHARE * options.max_error_m, color: options.max_color_error, faces };
 
-    if faces as f64 > 2.0 * faces_a_piece {
-        let cell_m = (whole.area() * faces_a_piece / faces as f64).sqrt().max(1e-3);
+    let [.., most] = faces_a_piece;
+    if faces as f64 > 2.0 * most {
+        let area_of_face = whole.area() / faces as f64;
         // What lies between the pieces of one round is within those of another, but for single corners.
-        let rounds = if target == 0 { &SHIFTS[..] } else { &SHIFTS[..1] };
-        for (round, shift) in (0..).zip(rounds) {
+        let rounds = faces_a_piece
+            .into_iter()
+            .zip(SHIFTS)
+            .skip(if target == 0 { 0 } else { 2 });
+        let count = rounds.len() as f64;
+        for (round, (faces_a_piece, shift)) in (0..).zip(rounds) {
+            let cell_m = (area_of_face * faces_a_piece).sqrt().max(1e-3);
             let work = |piece: &mut Patch| {
                 let share = target as f64 * piece.alive as f64 / faces as f64;
                 collapse_edges(piece, &limits((SLACK * share).ceil() as usize));
             };
-            let mut go_on = |done| go_on((f64::from(round) + done) / rounds.len() as f64);
-            whole.by_cubes(cell_m, *shift, work, &mut go_on)?;
+            let mut go_on = |done| go_on((f64::from(round) + done) / count);
+            whole.by_cubes(cell_m, shift, work, &mut go_on)?;
         }
         if target == 0 {
             return Some(whole);

@@ -108,7 +108,7 @@ fn any_number_of_threads_gives_the_same_bytes() {
     let options = DecimateOptions { target_faces: Some(900), ..DecimateOptions::default() };
     let on = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        let run = || decimate_in_pieces(&columns(&wall), &options, 1000.0, &mut |_| true).unwrap();
+        let run = || decimate_in_pieces(&columns(&wall), &options, [1000.0; 3], &mut |_| true).unwrap();
         pool.install(|| compact(&run(), false))
     };
     let one = on(1);
@@ -121,7 +121,7 @@ fn any_number_of_threads_gives_the_same_bytes() {
     let as_far_as_it_goes = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let options = DecimateOptions::default();
-        let run = || decimate_in_pieces(&columns(&wall), &options, 1000.0, &mut |_| true).unwrap();
+        let run = || decimate_in_pieces(&columns(&wall), &options, [1000.0; 3], &mut |_| true).unwrap();
         pool.install(|| compact(&run(), false))
     };
     let rounds = as_far_as_it_goes(1);
@@ -293,7 +293,8 @@ fn it_tells_how_far_it_is_and_ends_when_told() {
     let wall = wall(70, 0.002);
     let in_pieces = |most: f64| {
         let mut told = Vec::new();
-        let whole = decimate_in_pieces(&columns(&wall), &DecimateOptions::default(), 100.0, &mut |share| {
+        let options = DecimateOptions::default();
+        let whole = decimate_in_pieces(&columns(&wall), &options, [100.0; 3], &mut |share| {
             told.push(share);
             share <= most
         });
