@@ -31,7 +31,7 @@ fn refined_labels_are_nearer_to_the_truth() {
     let plan = ScanPlan { cell_m: 0.02, max_error_m: 0.008, pixels: 0.08, points_per_m2: 500.0 };
     let scan = scanned(&scene, &plan).unwrap();
     let world = World::new(&scene, &scan);
-    let poses = [0.6, 1.6, 2.6, 3.6, 4.6, 5.6]
+    let poses = [0.6, 1.1, 1.6, 2.1, 2.6, 3.1, 3.6, 4.1, 4.6, 5.1, 5.6, 6.1]
         .map(|yaw| Pose::level(scene.locations[0].position, yaw).turned(0.0, -0.2));
 
     let photographs: Vec<Shot> = poses.map(|pose| world.photograph(pose, 1.1, 240, 0.001)).into();

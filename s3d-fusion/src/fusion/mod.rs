@@ -111,15 +111,15 @@ impl Scale {
     /// The weight of a distance to the plane of a hit; 0 if it counts nothing. `before` is how far before the
     /// hit the voxel is along its ray.
     ///
-    /// Near the hit it is 1. It falls with the distance from the hit, so the nearest surface decides in
-    /// corners. Behind the surface it falls steeply, from half a cell on and what noise adds: what lies there
-    /// was not seen, and a ray that sees the other side of something thin knows it better.
+    /// Near the plane it is 1. It falls with the distance from it, so the nearest surface decides in corners.
+    /// Behind the surface it falls steeply, from half a cell on and what noise adds: what lies there was not
+    /// seen, and a ray that sees the other side of something thin knows it better.
     #[inline(always)]
     fn weight(&self, distance: f32, before: f32, sigma_m: f32) -> f32 {
         let cell = self.cell as f32;
         let behind = self.behind(sigma_m);
         let counts = f32::from((distance > -behind) & (before >= -3.0 * behind));
-        let near = before * (1.5 * cell).recip();
+        let near = distance * (self.front as f32).recip();
         let noise = 2.0 * sigma_m * (sigma_m * cell.recip()).min(1.0);
         let side = (distance + behind) / (behind - 0.5 * cell - noise).max(0.5 * cell);
         let side = side.min(1.0);
