@@ -61,10 +61,10 @@
 //! edge measures a mixture.
 //!
 //! **Weights.** An observation weighs by the inverse square of its noise, by the cosine at which the ray
-//! meets the surface, and less far from the plane: the nearest surface decides in corners. Distances are
+//! meets the surface, and less far from its plane: the nearest surface decides in corners. Distances are
 //! gathered up to [`FusionOptions::truncation_cells`] before a surface, and two cells and two sigma behind
 //! it. What is behind was not seen, so it weighs little there: a board of three cells keeps both sides, and
-//! those of a sheet are within a cell.
+//! those of a sheet are within about a cell.
 //!
 //! **Free space.** A voxel behind a surface is given up if as many images saw through it, the pixels around
 //! included, as saw it. Images also count what they see through block by block, where no voxels exist yet. So

@@ -174,8 +174,9 @@ impl<'a> Job<'a> {
         let mut frame = match camera {
             NerfstudioCamera::Perspective => NerfstudioFrame::perspective(rgb, &pose, size),
             NerfstudioCamera::Equirectangular => {
-                if size.0 != 2 * size.1 {
-                    let message = format!("a panorama of {} × {}, not twice as wide as high", size.0, size.1);
+                let (width, height) = size;
+                if width != 2 * height {
+                    let message = format!("a panorama of {width} × {height}, not twice as wide as high");
                     return Err(FileError::format(
                         &image.path(&self.source.data.layout, Domain::Rgb),
                         message,

@@ -50,8 +50,8 @@ pub(in crate::pack) fn pack(
     }
     let short = sequences.values().filter(|images| images.len() < LEAST).count();
     let mut notes = vec![
-        "ScanNetDataset(SCANNET_DIR=FOLDER, SCANNET_ANNOTATION_DIR=FOLDER/annotations, …) of VGGT reads it; \
-         a sequence is the views of a room, and train.jgz and test.jgz both have all of them"
+        "ScanNetDataset(SCANNET_DIR=FOLDER, SCANNET_ANNOTATION_DIR=FOLDER/annotations, …) of VGGT reads \
+         it; a sequence is the views of a room, and train.jgz and test.jgz both have all of them"
             .to_owned(),
         "depth is in millimetres, 0 where missing; the centre of the first pixel is (0.5, 0.5)".to_owned(),
     ];

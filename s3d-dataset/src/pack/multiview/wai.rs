@@ -54,8 +54,8 @@ pub(in crate::pack) fn pack(
         write_wai_scene_list(&folder.join(format!("scannetppv2_scene_list_{split}.npy")), &scenes)?;
     }
     Ok(vec![
-        "ScanNetPPWAI(ROOT=FOLDER, dataset_metadata_dir=FOLDER/metadata, split=\"train\", …) of MapAnything \
-         reads it; a scene is an area, and each split lists all scenes"
+        "ScanNetPPWAI(ROOT=FOLDER, dataset_metadata_dir=FOLDER/metadata, split=\"train\", …) of \
+         MapAnything reads it; a scene is an area, and each split lists all scenes"
             .to_owned(),
         "rendered_depth is in metres, 0 where missing; the centre of the first pixel is (0, 0)".to_owned(),
     ])
