@@ -53,6 +53,36 @@ fn a_sheet_of_no_thickness_has_both_sides_within_a_cell() {
 }
 
 #[test]
+fn where_images_disagree_a_surface_is_one_that_an_image_saw() {
+    // Three images see a sheet, and one says that it is 5.5 cm farther away.
+    let sheet_at = |y: f64| [Shape::cuboid(dvec3(-0.3, y, -0.4), dvec3(0.3, y + 0.001, 0.4))];
+    let eyes = [dvec3(-0.4, -1.2, 0.0), dvec3(0.0, -1.2, 0.3), dvec3(0.4, -1.2, 0.0), dvec3(0.2, -1.2, 0.0)];
+    let mut fusion = fusion(0.01);
+    for (eye, y) in eyes.into_iter().zip([0.0, 0.0, 0.0, 0.055]) {
+        let picture = picture(&sheet_at(y), look(eye, DVec3::ZERO), lens(240, 240, 260.0));
+        fusion.add(&picture).unwrap();
+    }
+    let mesh = fusion.mesh().unwrap();
+
+    let is_within = |p: &&Vec3| p.x.abs() < 0.25 && p.z.abs() < 0.35;
+    let between = |low: f32, high: f32| {
+        mesh.positions
+            .iter()
+            .filter(is_within)
+            .filter(|p| p.y > low && p.y < high)
+            .count()
+    };
+    for seen in [0.0, 0.055] {
+        assert!(
+            between(seen - 0.005, seen + 0.005) > 3300,
+            "at {seen}: {}",
+            between(seen - 0.005, seen + 0.005)
+        );
+    }
+    assert_eq!(between(0.006, 0.049), 0);
+}
+
+#[test]
 fn a_step_in_depth_is_not_bridged() {
     let near = Shape::cuboid(dvec3(-1.0, 1.0, -1.0), dvec3(0.0, 1.1, 1.0));
     let wall = Shape::Plane(dvec3(0.0, 1.6, 0.0), -DVec3::Y);

@@ -95,15 +95,17 @@ impl<'a> Samples<'a> {
     }
 
     /// Returns the cells between four rows that the surface crosses and of which all is known, as bits: each
-    /// corner was seen, and one at least was seen just before a surface. Where rays only passed beside a
-    /// surface, its end is not known.
+    /// corner was seen, one at least just before a surface, and one at a surface. Where rays only passed beside
+    /// a surface, its end is not known. Where some say that they are far before a surface and others that they
+    /// are far behind one, nobody saw a surface.
     fn crossed(rows: &[RowStates; 4]) -> u16 {
         let both = |a: u16| a & a >> 1;
         let either = |a: u16| a | a >> 1;
         let known = rows.iter().fold(0xffff, |all, row| all & row.known);
         let behind = rows.iter().fold(0, |any, row| any | row.behind);
         let before = rows.iter().fold(0, |any, row| any | row.before);
-        both(known) & either(behind) & either(before) & 0xff
+        let at = rows.iter().fold(0, |any, row| any | row.at);
+        both(known) & either(behind) & either(before) & either(at) & 0xff
     }
 
     /// Adds the faces of a cell. `behind`: its corners behind the surface, as bits.

@@ -230,7 +230,6 @@ impl Adding<'_> {
             let weight = f32::from(counts) * scale.weight(distance, before, sigma[lane]) * trust[lane];
             row.distance[lane] = distance * front.recip();
             row.weight[lane] = weight;
-            row.is_at[lane] = f32::from((weight > 0.0) & (distance < 0.5 * cell));
             is_touched[lane] = row.weight[lane] + row.is_far[lane] + row.is_through[lane] > 0.0;
             is_colored[lane] = (weight > 0.0) & (distance.abs() < 2.0 * cell);
         }
@@ -238,7 +237,7 @@ impl Adding<'_> {
         if is_touched == [false; LANES] {
             return;
         }
-        let shares = block.observe_row(first, &row);
+        let shares = block.observe_row(first, &row, scale.near());
         if is_colored == [false; LANES] {
             return;
         }

@@ -72,6 +72,13 @@ impl Scale {
         is_near.then(|| walk::floor(place))
     }
 
+    /// Voxels are at a surface up to this distance, as a share of the truncation. Where a surface crosses an
+    /// edge of a cell, one end is at most half a cell away; a little more, for rounding.
+    #[inline(always)]
+    fn near(&self) -> f32 {
+        (0.6 * self.cell / self.front) as f32
+    }
+
     /// How far behind a surface its distance is gathered. The corners of a cell that the surface crosses are
     /// at most √3 cells behind it, and noise must not make a side.
     #[inline(always)]

@@ -167,8 +167,7 @@ impl AddingRays<'_> {
             if distance >= front || weight * share <= 0.0 {
                 return;
             }
-            let is_at = distance < 0.5 * cell as f32;
-            let share = block.observe(i, distance / front, weight * share * shot.weight, is_at);
+            let share = block.observe(i, distance / front, weight * share * shot.weight, self.scale.near());
             if let Some(color) = shot.color.filter(|_| distance.abs() < 2.0 * cell as f32) {
                 block.mix_color(i, color, share, chance(i as u32, self.number));
             }

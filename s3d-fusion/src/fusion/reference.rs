@@ -72,14 +72,19 @@ fn the_sparse_grid_is_the_dense_one() {
                 // Blocks are made when a ray comes near: what earlier images saw of them from afar is not
                 // kept.
                 Some((block, free)) => match (block.voxel(i, free), expected) {
-                    (Voxel::Distance(a), Voxel::Distance(b)) => {
+                    (Voxel::Distance { distance: a, .. }, Voxel::Distance { distance: b, .. }) => {
                         assert!((a - b).abs() < 0.2, "{place:?} {i}: {a} {b}");
                         crossings += usize::from(a == b);
                     }
-                    (Voxel::Unknown, Voxel::Distance(d)) => assert!(d.abs() > 0.4, "{place:?} {i}: {d}"),
+                    (Voxel::Unknown, Voxel::Distance { distance: d, .. }) => {
+                        assert!(d.abs() > 0.4, "{place:?} {i}: {d}")
+                    }
                     (_, _) => {}
                 },
-                None => assert!(!matches!(expected, Voxel::Distance(d) if d.abs() < 0.1), "{place:?} {i}"),
+                None => assert!(
+                    !matches!(expected, Voxel::Distance { distance: d, .. } if d.abs() < 0.1),
+                    "{place:?} {i}"
+                ),
             }
         }
     }

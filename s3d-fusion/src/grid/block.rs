@@ -10,7 +10,7 @@ pub(crate) struct Block {
     /// a ray passed.
     distance: [i16; VOXELS],
     /// The sum of weights: the upper half of a 32-bit float. Observations of the same weight count up to the
-    /// 256th, and later ones replace older ones.
+    /// 256th, and later ones replace older ones. The bit of the sign is [`AT`].
     weight: [u16; VOXELS],
     /// How many images saw the voxel at or behind a surface, less those that saw through it.
     votes: [i16; VOXELS],
@@ -20,6 +20,8 @@ pub(crate) struct Block {
 
 /// The distance of a voxel that was seen far before surfaces alone.
 const PASSED: i16 = i16::MAX;
+/// Part of the weight of voxels that were seen at a surface: one of their distances was near 0.
+const AT: u16 = 0x8000;
 /// The colour of voxels without one.
 pub(crate) const NO_COLOR: [u8; 3] = [0; 3];
 
@@ -30,8 +32,6 @@ pub(crate) struct Row {
     pub(crate) distance: Lanes,
     /// 0 where no distance was observed.
     pub(crate) weight: Lanes,
-    /// Whether the voxel is at the surface or behind it; 0 where no distance was observed.
-    pub(crate) is_at: Lanes,
     /// Whether a ray passed far before all that it hit.
     pub(crate) is_far: Lanes,
     /// Whether a ray passed certainly, also beside the ray.
@@ -51,8 +51,8 @@ pub(crate) enum Voxel {
     Unknown,
     /// Rays passed it far before they hit something.
     Passed,
-    /// Its signed distance as a share of the truncation.
-    Distance(f32),
+    /// Its signed distance as a share of the truncation, and whether it was seen at a surface.
+    Distance { distance: f32, is_at: bool },
 }
 
 /// What is known of the voxels of a row, a bit each.
@@ -64,6 +64,8 @@ pub(crate) struct RowStates {
     pub(crate) behind: u16,
     /// It has a distance, and is before the surface.
     pub(crate) before: u16,
+    /// It has a distance, and was seen at a surface.
+    pub(crate) at: u16,
 }
 
 impl RowStates {
@@ -73,15 +75,12 @@ impl RowStates {
         let (value, known) = match voxel {
             Voxel::Unknown => (passed, 0),
             Voxel::Passed => (passed, all),
-            Voxel::Distance(distance) => (distance, all),
+            Voxel::Distance { distance, .. } => (distance, all),
         };
         values[..all.count_ones() as usize].fill(value);
-        let (behind, before) = match voxel {
-            Voxel::Distance(distance) if distance < 0.0 => (all, 0),
-            Voxel::Distance(_) => (0, all),
-            _ => (0, 0),
-        };
-        Self { known, behind, before }
+        let Voxel::Distance { distance, is_at } = voxel else { return Self { known, ..Self::default() } };
+        let if_so = |is_so: bool| if is_so { all } else { 0 };
+        Self { known, behind: if_so(distance < 0.0), before: if_so(distance >= 0.0), at: if_so(is_at) }
     }
 
     /// Adds the states of voxels from place `first` of the row on.
@@ -89,6 +88,7 @@ impl RowStates {
         self.known |= other.known << first;
         self.behind |= other.behind << first;
         self.before |= other.before << first;
+        self.at |= other.at << first;
     }
 }
 
@@ -110,7 +110,8 @@ impl Block {
         if is_carved {
             Voxel::Unknown
         } else {
-            Voxel::Distance(f32::from(self.distance[i]) / 32767.0)
+            let distance = f32::from(self.distance[i]) / 32767.0;
+            Voxel::Distance { distance, is_at: self.weight[i] & AT != 0 }
         }
     }
 
@@ -128,6 +129,7 @@ impl Block {
             states.known |= u16::from(is_passed | is_seen) << lane;
             states.behind |= u16::from(is_seen & (distance < 0)) << lane;
             states.before |= u16::from(is_seen & (distance >= 0)) << lane;
+            states.at |= u16::from(is_seen & (self.weight[i] & AT != 0)) << lane;
             *value = if is_seen { f32::from(distance) / 32767.0 } else { passed };
         }
         states
@@ -150,32 +152,33 @@ impl Block {
         }
     }
 
-    /// Adds a distance, as a share of the truncation, to the mean of a voxel. `is_at`: the voxel is at the
-    /// surface or behind it. Returns the share that the distance has in the mean.
+    /// Adds a distance, as a share of the truncation, to the mean of a voxel. If it is at most `near`, the
+    /// voxel is at the surface. Returns the share that the distance has in the mean.
     #[inline(always)]
-    pub(crate) fn observe(&mut self, i: usize, distance: f32, weight: f32, is_at: bool) -> f32 {
-        let old = f32::from_bits(u32::from(self.weight[i]) << 16);
+    pub(crate) fn observe(&mut self, i: usize, distance: f32, weight: f32, near: f32) -> f32 {
+        let old = f32::from_bits(u32::from(self.weight[i] & !AT) << 16);
         let sum = old + weight;
         let share = weight / sum;
         let mean = if old > 0.0 { f32::from(self.distance[i]) } else { 0.0 };
         let mean = mean + (distance * 32767.0 - mean) * share;
         self.distance[i] = floor(mean.clamp(-32766.0, 32766.0) + 0.5) as i16;
         // Rounded to the nearest half.
-        self.weight[i] = ((sum.to_bits() + 0x8000) >> 16) as u16;
-        self.votes[i] = self.votes[i].saturating_add(i16::from(is_at));
+        let at = self.weight[i] & AT | u16::from(distance.abs() < near) << 15;
+        self.weight[i] = ((sum.to_bits() + 0x8000) >> 16) as u16 | at;
+        self.votes[i] = self.votes[i].saturating_add(i16::from(distance < near));
         share
     }
 
     /// Does for voxels from `first` on what [`Block::pass`] and then [`Block::observe`] do for one.
     /// Returns the shares that the distances have in the means.
     #[inline(always)]
-    pub(crate) fn observe_row(&mut self, first: usize, row: &Row) -> Lanes {
+    pub(crate) fn observe_row(&mut self, first: usize, row: &Row, near: f32) -> Lanes {
         let place = first..first + LANES;
         let [distances, votes] = [&mut self.distance, &mut self.votes].map(|c| &mut c[place.clone()]);
         let weights = &mut self.weight[place];
         let (mut old, mut distance, mut vote) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
         for lane in 0..LANES {
-            old[lane] = f32::from_bits(u32::from(weights[lane]) << 16);
+            old[lane] = f32::from_bits(u32::from(weights[lane] & !AT) << 16);
             distance[lane] = f32::from(distances[lane]);
             vote[lane] = f32::from(votes[lane]);
         }
@@ -195,9 +198,12 @@ impl Block {
         }
         for lane in 0..LANES {
             distances[lane] = floor(distance[lane] + 0.5) as i16;
-            weights[lane] = ((sums[lane].to_bits() + 0x8000) >> 16) as u16;
+            let is_seen = row.weight[lane] > 0.0;
+            let at = weights[lane] & AT | u16::from(is_seen & (row.distance[lane].abs() < near)) << 15;
+            weights[lane] = ((sums[lane].to_bits() + 0x8000) >> 16) as u16 | at;
             let vote = (vote[lane] - row.is_through[lane]).max(i16::MIN.into());
-            votes[lane] = floor((vote + row.is_at[lane]).min(i16::MAX.into())) as i16;
+            let is_behind = f32::from(is_seen & (row.distance[lane] < near));
+            votes[lane] = floor((vote + is_behind).min(i16::MAX.into())) as i16;
         }
         shares
     }
@@ -252,12 +258,10 @@ mod tests {
                 if below(3) > 0 {
                     row.distance[lane] = below(4001) as f32 / 2000.0 - 1.0;
                     row.weight[lane] = (1 + below(1000)) as f32 / 300.0;
-                    let is_at = row.distance[lane] < 0.1;
-                    row.is_at[lane] = f32::from(is_at);
-                    *expected = single.observe(i, row.distance[lane], row.weight[lane], is_at);
+                    *expected = single.observe(i, row.distance[lane], row.weight[lane], 0.1);
                 }
             }
-            assert_eq!(rows.observe_row(first, &row), expected);
+            assert_eq!(rows.observe_row(first, &row, 0.1), expected);
         }
         assert_eq!((rows.distance, rows.weight, rows.votes), (single.distance, single.weight, single.votes));
 
