@@ -339,8 +339,11 @@ impl Progress {
             let seconds_left = left.is_finite().then(|| thousandths(left));
             let rate = thousandths(rate);
             write_json(&Line::Progress { what, unit, done: self.done, total, rate, seconds_left }, false);
+        } else if self.done == 0 {
+            info!("{what} 0/{total} {unit}");
         } else {
-            info!("{what} {}/{total} {unit}, {rate:.1}/s, {left:.0} s left", self.done);
+            let rate = round_rate(rate);
+            info!("{what} {}/{total} {unit}, {rate}/s, {left:.0} s left", self.done);
         }
     }
 }

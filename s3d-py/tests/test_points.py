@@ -151,6 +151,34 @@ def test_annotated_points_are_those_of_the_files(demo: Path) -> None:
     assert "instances" in repr(points)
 
 
+def test_annotated_points_are_saved_and_read_again(demo: Path, tmp_path: Path) -> None:
+    points = s3d.read_points(demo / "scan" / "Area_1")
+    path = tmp_path / "points.npz"
+    points.save(path)
+    again = s3d.read_points(path, room_column="room")
+    assert set(again.names) == set(points.names) and len(again) == len(points)
+    for name in points.names[::9]:
+        of_name = [cloud.label == cloud.names.index(name) for cloud in (points, again)]
+        assert np.array_equal(points.xyz[of_name[0]], again.xyz[of_name[1]])
+        assert np.array_equal(points.rgb[of_name[0]], again.rgb[of_name[1]])
+
+    some, label = points.xyz[:2], [0, 1]
+    refused: list[tuple[str, list[str], str]] = [
+        ("points.ply", [*points.names], "only as .npz"),
+        ("other.npz", ["chair"], "chair_1_office_2"),
+        ("other.npz", ["chair_1_office_2"], "from 0 to 1 for 1 names"),
+    ]
+    for wrong, names, match in refused:
+        with pytest.raises(s3d.UsageError, match=match):
+            s3d.save_points(tmp_path / wrong, some, None, label, names=names)
+    assert [file.name for file in tmp_path.iterdir()] == ["points.npz"]
+
+    # What labels without names mean must be said, and the message tells how here.
+    s3d.save_points(path, some, None, label)
+    with pytest.raises(s3d.FileError, match="`class_column`"):
+        s3d.read_points(path, room="office_1")
+
+
 def test_tables_of_points_tell_their_columns(tmp_path: Path) -> None:
     table = np.array([[0, 0, 0, 8, 1], [1, 0, 0, 8, 2], [0, 1, 0, 1, 1]], np.float32)
     np.save(tmp_path / "points.npy", table)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike, fspath
@@ -14,11 +15,15 @@ import numpy.typing as npt
 
 from . import _native
 from ._checks import MOST_SEED, colors_of, number, rows, whole
-from ._errors import UsageError
+from ._errors import Error, UsageError
 from ._files import replaced
 from ._mesh import Mesh, MeshLike, as_mesh
 from ._names import NameInRoom
 from ._progress import Progress, sink
+
+
+# The class, its number in the room, and the room: its type and number.
+_NAME = re.compile(r"(.+?)_(\d{1,9})_(.+_\d+)")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -72,6 +77,12 @@ class AnnotatedPoints:
 
     def __len__(self) -> int:
         return len(self.xyz)
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Writes positions, colours and names as `.npz`, which `read_points(path, room_column="room")` reads
+        again: see `save_points`.
+        """
+        save_points(path, self.xyz, self.rgb, self.label, names=self.names)
 
     def __repr__(self) -> str:
         return f"AnnotatedPoints({len(self):,} points of {len(self.names):,} instances)"
@@ -128,6 +139,13 @@ frame with columns x, y, z.
 """
 
 
+# Messages name the keys of a scene file.
+_KEYS = (
+    "Here keys of [annotations] are arguments: `classes` and `room`, and for columns `class_column`, "
+    "`instance_column`, `room_column` and `columns`"
+)
+
+
 def read_points(
     paths: str | PathLike[str] | Sequence[str | PathLike[str]],
     *,
@@ -168,7 +186,12 @@ def read_points(
         lenient=lenient,
     )
     files = [paths] if isinstance(paths, (str, PathLike)) else list(paths)
-    xyz, rgb, label, names = _native.read_points([fspath(path) for path in files], how, sink(progress))
+    try:
+        xyz, rgb, label, names = _native.read_points([fspath(path) for path in files], how, sink(progress))
+    except Error as error:
+        if "[annotations" in str(error):
+            error.args = (f"{error}. {_KEYS}", *error.args[1:])
+        raise
     return AnnotatedPoints(xyz, rgb, label, [NameInRoom(name) for name in names])
 
 
@@ -177,6 +200,8 @@ def save_points(
     xyz: npt.ArrayLike,
     rgb: npt.ArrayLike | None = None,
     labels: npt.ArrayLike | None = None,
+    *,
+    names: Sequence[str] | None = None,
 ) -> None:
     """Writes N points, completely or not at all. An existing file is replaced. The ending of the path tells the
     form: `.ply` (binary), `.las` (1.4, steps of 0.1 mm, labels as the extra dimension `label`), or `.npz`
@@ -185,6 +210,9 @@ def save_points(
     - `xyz`: (N, 3), metres.
     - `rgb`: (N, 3), sRGB, whole numbers from 0 to 255 or floats from 0 to 1; black if None.
     - `labels`: (N,), whole numbers of 32 bits.
+    - `names`: the instance that each label is the index of, such as "chair_1_office_2". They are written as the
+      columns `class`, `instance` and `room` in place of `label`, only as `.npz`. `read_points(path,
+      room_column="room")` reads them.
     """
     ending = Path(path).suffix.lower()
     if ending not in (".ply", ".las", ".npz"):
@@ -197,12 +225,47 @@ def save_points(
             raise UsageError(f"{len(of_points)} {what} for {len(positions)} points: one for each")
     if column is not None and column.ndim != 1:
         raise UsageError(f"labels: an array (N,), not of shape {column.shape}")
+    if names is not None:
+        if ending != ".npz" or column is None:
+            raise UsageError("names are written with labels, and only as .npz")
+        _save_named(path, positions, colors, column, names)
+        return
     if ending != ".npz":
         _native.write_points(fspath(path), positions, colors, column, ending == ".las")
         return
-    arrays: dict[str, Any] = {"xyz": positions, "rgb": colors, "label": column}
+    _save_arrays(path, {"xyz": positions, "rgb": colors, "label": column})
+
+
+def _save_named(
+    path: str | PathLike[str],
+    xyz: npt.NDArray[np.float32],
+    rgb: npt.NDArray[np.uint8] | None,
+    labels: npt.NDArray[np.int32],
+    names: Sequence[str],
+) -> None:
+    """Writes points with the class, the number and the room of their instances."""
+    parts = [_NAME.fullmatch(name) for name in names]
+    odd = next((name for name, part in zip(names, parts) if part is None), None)
+    if odd is not None:
+        raise UsageError(f'names: {odd!r} is not of the form "chair_1_office_2"')
+    if len(labels) and not (0 <= labels.min() and labels.max() < len(names)):
+        found = f"from {labels.min()} to {labels.max()}"
+        raise UsageError(f"labels {found} for {len(names)} names: indices into the names")
+    words = [part.groups() for part in parts if part]
+    columns = {
+        "class": np.array([word[0] for word in words], dtype=np.str_),
+        "instance": np.array([int(word[1]) for word in words], dtype=np.int32),
+        "room": np.array([word[2] for word in words], dtype=np.str_),
+    }
+    of_points = {name: column[labels] for name, column in columns.items()}
+    _save_arrays(path, {"xyz": xyz, "rgb": rgb, **of_points})
+
+
+def _save_arrays(path: str | PathLike[str], arrays: Mapping[str, npt.NDArray[Any] | None]) -> None:
+    """Writes arrays as NPZ, completely or not at all."""
+    given: dict[str, Any] = {name: array for name, array in arrays.items() if array is not None}
     with replaced(Path(path)) as file:
-        np.savez(file, **{name: array for name, array in arrays.items() if array is not None})
+        np.savez(file, **given)
 
 
 def sample(
