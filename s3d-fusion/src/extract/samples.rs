@@ -94,10 +94,11 @@ impl<'a> Samples<'a> {
         part
     }
 
-    /// Returns the cells between four rows that the surface crosses and of which all is known, as bits: each
-    /// corner was seen, one at least just before a surface, and one at a surface. Where rays only passed beside
-    /// a surface, its end is not known. Where some say that they are far before a surface and others that they
-    /// are far behind one, nobody saw a surface.
+    /// Returns the cells between four rows that the surface crosses and of which all is known, as bits.
+    ///
+    /// Each corner was seen, one at least just before a surface, and one at a surface. Where rays only passed
+    /// beside a surface, its end is not known. Where some say that they are far before a surface and others
+    /// that they are far behind one, nobody saw a surface.
     fn crossed(rows: &[RowStates; 4]) -> u16 {
         let both = |a: u16| a & a >> 1;
         let either = |a: u16| a | a >> 1;
