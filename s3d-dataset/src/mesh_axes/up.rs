@@ -58,8 +58,8 @@ impl UpGuess {
         let [y, z] = self.level.map(|share| 100.0 * share);
         (self.is_clear() && self.up() != said).then(|| {
             format!(
-                "+{} is to point up, but {y:.0} % of the surface is level with +Y, and {z:.0} % with +Z: is it \
-                 on its side? (up = {} turns it)",
+                "+{} is to point up, but {y:.0} % of the surface is level with +Y, and {z:.0} % with +Z: is \
+                 it on its side? (up = {} turns it)",
                 said.name().to_uppercase(),
                 self.up().name()
             )

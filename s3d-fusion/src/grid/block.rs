@@ -152,8 +152,8 @@ impl Block {
         }
     }
 
-    /// Adds a distance, as a share of the truncation, to the mean of a voxel. If it is at most `near`, the
-    /// voxel is at the surface. Returns the share that the distance has in the mean.
+    /// Adds a distance, as a share of the truncation, to the mean of a voxel. If it is within
+    /// `near` of 0, the voxel is at the surface. Returns the share that the distance has in the mean.
     #[inline(always)]
     pub(crate) fn observe(&mut self, i: usize, distance: f32, weight: f32, near: f32) -> f32 {
         let old = f32::from_bits(u32::from(self.weight[i] & !AT) << 16);

@@ -103,8 +103,8 @@ pub(super) fn find_masks(
 
     if let Some(first) = missing.first() {
         warnings.push(format!(
-            "{}: {} of {} photographs have no mask and are shown whole: {} is not there; masks = \"…\" under \
-             [frames] names the folder",
+            "{}: {} of {} photographs have no mask and are shown whole: {} is not there; masks = \"…\" \
+             under [frames] names the folder",
             source.path.display(),
             missing.len(),
             cameras.len(),
