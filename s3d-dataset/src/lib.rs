@@ -12,7 +12,7 @@
 //! | [`compare`](mod@compare), [`statistics`](mod@statistics) | say how two data sets differ; count one |
 //! | [`pack`](mod@pack), [`profile`](mod@profile), [`xyz`](mod@xyz) | write what trainers and loaders read |
 //! | [`pairs`](mod@pairs) | finds the images that see the same surface |
-//! | [`place`], [`render`](mod@render), [`sample`](mod@sample) | need a mesh alone: places, pictures, points |
+//! | [`place`], [`render`](mod@render), [`sample`](mod@sample) | need a mesh alone: places, images, points |
 //! | [`mesh_axes`] | reads a mesh whose up axis and unit are not known |
 //! | [`store`], [`parallel`] | for crates that write results of their own beside a data set |
 //! | [`error`], [`event`], [`summary`] | what a call answers, and what it tells on its way |
